@@ -17,7 +17,7 @@ from conformance.api.call_rules import words_of
 from conformance.api.rest.references import singular
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import collection_of
-from conformance.checkers.occasion import Occasion
+from conformance.checkers.occasion import ABSENT, MOST_OCTETS, SETTLES_S, Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.json_text import read_json
@@ -27,12 +27,8 @@ from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
 from conformance.verdict.evidence import Case
 
-_ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
-_MOST_OCTETS: Final = 65_536
 _MOST_THINGS: Final = 1_000
 _KEPT: Final = "description/refused-keeps"
-# A device may carry out an operation this long after its response, s.
-_SETTLES_S: Final = 3.0
 # Phrases in a description: for the state to which an operation leads, and for the conditions on which it is refused.
 _LEADS: Final = re.compile(
     r"\b(?:is|are) (?:then|now|afterwards) `?([\w-]+)|\b(?:becomes?|goes (?:in)?to|turns) `?([\w-]+)", re.IGNORECASE
@@ -64,9 +60,10 @@ _IS: Final = re.compile(r"\b(unless )?(?<!of )(it|the [\w-]+) (?:is|are) (not |n
 _BESIDE: Final = re.compile(r"\b(?:already|still|currently|also|yet|now|been)\b|[`()]", re.IGNORECASE)
 _STATES: Final = frozenset({"state", "status", "phase"})
 _CANCELLED: Final = frozenset({"cancelled", "canceled", "aborted"})
-_DONE: Final = frozenset({"done", "finished", "completed", "complete", "succeeded"})
+#: States in which an activity has come to its own end.
+DONE: Final = frozenset({"done", "finished", "completed", "complete", "succeeded"})
 #: States in which an activity has ended.
-FINAL: Final = _CANCELLED | _DONE
+FINAL: Final = _CANCELLED | DONE
 # States of a thing that was put away. A final state may change to one of them.
 _AWAY: Final = frozenset({"archived", "expired", "deleted", "removed", "purged"})
 #: Operations that end or interrupt an activity.
@@ -248,7 +245,7 @@ class Changes:
         """Judge a read of a resource."""
         status = occasion.response.status
         refused = self._there.pop(path, "")
-        if status in _ABSENT and refused:
+        if status in ABSENT and refused:
             expected, doubt = f"what was there before {refused}", "the thing may have ended by itself"
             yield occasion.case(_KEPT, False, expected, cause=operation.label, doubt=doubt)  # noqa: FBT003 - see case()
         if not occasion.response.ok:
@@ -283,7 +280,7 @@ class Changes:
             is_said = now in _CANCELLED or now in self._said_final.get(template, ())
             cause, doubt = f"{operation.label} end", "" if is_said else "it may have run again meanwhile"
             yield occasion.case("description/states", not moved, expected, found, cause=cause, doubt=doubt)
-        is_late = sent_s - before.at_s > _SETTLES_S
+        is_late = sent_s - before.at_s > SETTLES_S
         # The state that the response announced has not come yet.
         if before.told and now != before.value and now.casefold() not in FINAL and not is_late:
             return
@@ -436,7 +433,7 @@ def _final(read: Operation, name: str, operations: Iterable[Operation]) -> froze
 
 
 def _state_in(occasion: Occasion, name: str) -> str:
-    found = occasion.members([name]).get(name) if len(occasion.response.body) <= _MOST_OCTETS else None
+    found = occasion.members([name]).get(name) if len(occasion.response.body) <= MOST_OCTETS else None
     return found if isinstance(found, str) else ""
 
 
@@ -492,6 +489,13 @@ class Transitions:
             self._seen.clear()
             is_once = operation is not None and operation.label in self._once
             self._done = {*self._done, path} if is_once else set()
+            above, template = path.rpartition("/")[0], operation.template.rpartition("/")[0] if operation else ""
+            read = self._reads.get(template)
+            # A device may reach other states later than it tells them.
+            if operation is not None and read is not None and status == HTTPStatus.OK and operation.shape == read.shape:
+                name = state_member(read)
+                told = _state_in(occasion, name) if name else ""
+                self._seen |= {above: {name: told}} if told.casefold() in FINAL else {}
 
     def _act(
         self, occasion: Occasion, operation: Operation, barred: dict[str, frozenset[str]], path: str
@@ -512,7 +516,7 @@ class Transitions:
     def _read(self, occasion: Occasion, template: str, path: str) -> None:
         """Record the members of a thing as read."""
         answer, read = occasion.response, self._reads.get(template)
-        is_usable = read is not None and answer.ok and is_json(answer.media_type) and len(answer.body) <= _MOST_OCTETS
+        is_usable = read is not None and answer.ok and is_json(answer.media_type) and len(answer.body) <= MOST_OCTETS
         shape = flat(read.shape or {}).get("properties", {}) if read is not None else {}
         now = occasion.members(shape) if is_usable else {}
         self._seen.pop(path, None)

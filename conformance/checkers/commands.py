@@ -17,8 +17,8 @@ from conformance.api.rest.listing import listing_of
 from conformance.api.rest.patches import same
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import id_member, object_in, parts_of
-from conformance.checkers.changes import state_member
-from conformance.checkers.occasion import Occasion
+from conformance.checkers.changes import DONE, state_member
+from conformance.checkers.occasion import SETTLES_S, Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.json_text import clip, read_json
@@ -27,8 +27,6 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.verdict.evidence import Case
 
-#: A device may carry out a command this long after its response, s.
-SETTLES_S: Final = 3.0
 # How often a command must fail so; once may be by chance. _MOST: things that are remembered.
 _TWICE, _MOST = 2, 1_000
 # Phrases in a description which say that a command acts later or not always, or that its response shows what was.
@@ -40,9 +38,8 @@ _LATER: Final = re.compile(
 LIVE: Final = frozenset({"running", "active", "executing", "inprogress", "started", "moving", "working"})
 _WAITING: Final = frozenset({"queued", "pending", "scheduled", "created", "new", "waiting", "accepted", "paused"})
 _IDLE: Final = frozenset({"idle", "ready", "stopped"})
-# Commands that keep an activity from its end, and states after that.
+# Commands that keep an activity from its end.
 _ENDS: Final = frozenset({"cancel", "abort"})
-_DONE: Final = frozenset({"done", "finished", "completed", "complete", "succeeded"})
 # By command: names of the switch that it sets, or of the state to which it leads, and the states from which.
 _OFF: Final = {
     "disable": "enable", "deactivate": "activate", "unlock": "lock", "close": "open", "disarm": "arm",
@@ -84,7 +81,7 @@ class Command(NamedTuple):
             return name if before.get(name) is (not value) and now.get(name) is (not value) else ""
         if self.state is not None:
             name, states = self.state
-            is_undone = bool(words_of(self.operation.template) & _ENDS) and plain_name(str(now.get(name))) in _DONE
+            is_undone = bool(words_of(self.operation.template) & _ENDS) and plain_name(str(now.get(name))) in DONE
             return name if str(before.get(name)) in states and (before[name] == now.get(name) or is_undone) else ""
         return ""
 
@@ -133,7 +130,7 @@ def _state(verb: str, read: Operation) -> tuple[str, frozenset[str]] | None:
     to, start = _STATES.get(verb, (frozenset(), frozenset()))
     usable = frozenset(one for one, plain in states.items() if plain in start)
     # An activity that was started and is over may be idle again, where no state tells its end.
-    is_told = verb != "start" or bool(_DONE & set(states.values()))
+    is_told = verb != "start" or bool(DONE & set(states.values()))
     return (name, usable) if usable and is_told and to & set(states.values()) else None
 
 
@@ -194,7 +191,7 @@ class Commands:
         told = read_json(answer.body).value if is_json(answer.media_type) else None
         untrue = "" if _LATER.search(command.operation.text) else command.untrue(told, before, now)
         missed = command.is_due(before, now)
-        is_over = bool(missed) and plain_name(str(now.get(missed))) in _DONE
+        is_over = bool(missed) and plain_name(str(now.get(missed))) in DONE
         if (untrue or missed) and not is_over and occasion.sent_s - answer.received_s < SETTLES_S:
             return
         del self._sent[path]

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 from conformance.api.rest.statuses import refuses
 from conformance.checkers.entity_tags import Fields, fields_of, label_of
-from conformance.checkers.occasion import Occasion
+from conformance.checkers.occasion import SETTLES_S, Occasion
 from conformance.documents.files import MEDIA, keeps_octets
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import SAFE, is_json
@@ -31,8 +31,6 @@ _MEMBERS: Final = {"sha256": hashlib.sha256, "sha512": hashlib.sha512}
 _OCTETS, _TEXT = "application/octet-stream", "text/plain"
 # _MOST: contents that are remembered. _LARGEST: bytes of each.
 _MOST, _LARGEST = 200, 1 << 20
-# A device may go on showing the file before for so long, s.
-_SETTLES_S: Final = 3.0
 # _START: octets by which a file of a media type is known. _WITHIN: some of an image's pixels, behind its header.
 _START, _WITHIN = 4, slice(60, 76)
 _RANGE = "http/range"
@@ -133,7 +131,7 @@ class Contents:
             is_new = sent.request.method == "POST"
             differs = self._differs.setdefault(label if is_new else occasion.request.url.partition("?")[0], set())
             differs |= set() if is_kept else {octets}
-            if is_old and occasion.sent_s - sent.response.received_s < _SETTLES_S:
+            if is_old and occasion.sent_s - sent.response.received_s < SETTLES_S:
                 self._sent[occasion.request.url] = sent
             # A single difference may come from another client's upload.
             elif is_kept or len(differs) > 1:

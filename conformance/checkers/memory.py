@@ -19,6 +19,7 @@ from conformance.api.call_rules import words_of
 from conformance.api.rest.listing import items_of
 from conformance.api.rest.references import collections_of, singular
 from conformance.api.rest.things import (
+    SET,
     as_answered,
     collection_of,
     differences,
@@ -28,12 +29,13 @@ from conformance.api.rest.things import (
     identifier_of,
     is_devices,
     is_marked_deleted,
+    is_reordered,
     is_shared,
     parts_for,
     parts_of,
     says_exactly,
 )
-from conformance.checkers.occasion import Occasion
+from conformance.checkers.occasion import ABSENT, MOST_OCTETS, SETTLES_S, Occasion
 from conformance.checkers.writes import DEFAULTED
 from conformance.contract.pack import Contract
 from conformance.documents.json_text import clip, read_json
@@ -44,17 +46,13 @@ from conformance.transport.exchange import Exchange
 from conformance.transport.reach import is_same, joined
 from conformance.verdict.evidence import SENTENCE, Case
 
-# A device may store a change this long after its response, s.
-_SETTLES_S: Final = 3.0
-_ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 _REFUSED: Final = range(400, 500)
 # _SEEN: how often a difference must appear before it counts, because other clients or several server processes may
 # cause one.
 _SEEN: Final = 2
 _MOST_PENDING: Final = 20
 _MOST_THINGS: Final = 1_000
-# _MOST_OCTETS: larger bodies are not remembered. _SHOWN: characters of a value in a message.
-_MOST_OCTETS: Final = 65_536
+# Characters of a value in a message.
 _SHOWN: Final = 200
 # _FOR_EVER: members that no change of a thing changes. _TELLING: least length of an identifier that two devices do not
 # share by chance.
@@ -258,7 +256,7 @@ class Memory:
     def _judge_put(occasion: Occasion, put: Operation, before: _Thing | None) -> Iterator[Case]:
         """Judge whether a PUT tells by 201 that it has created a thing, and by other statuses that it replaced one."""
         is_new, status = before is not None and before.gone and before.absent, occasion.response.status
-        if put.method == "PUT" and before is not None and (is_new or not before.gone):
+        if put.method == "PUT" and before is not None and (is_new or not (before.gone or before.absent)):
             expected = f"status 201, as a GET after {before.change} found nothing" if is_new else "status 200 or 204"
             expected += "" if is_new else f", as a thing was there after {before.change}"
             holds, known = (status == HTTPStatus.CREATED) is bool(is_new), {"201"} if is_new else {"200", "204"}
@@ -396,8 +394,10 @@ class Memory:
             yield from self._judge_deleted(occasion, item, thing, age_s)
             return
         kept = item.template, ""
-        if response.status in _ABSENT and thing.made:
-            if age_s > _SETTLES_S and not thing.replaced and item.template not in self._ends:
+        # What another request has ended, PUT creates anew.
+        thing.absent = response.status in ABSENT
+        if response.status in ABSENT and thing.made:
+            if age_s > SETTLES_S and not thing.replaced and item.template not in self._ends:
                 expected = f"the thing that {thing.change} has created {age_s:.0f} s before"
                 doubt = doubt_of_life(item) or "it may keep only the newest of them, or for a time of its own"
                 case = self._case("created-is-there", occasion, expected, cause=item.label, doubt=doubt)
@@ -415,8 +415,8 @@ class Memory:
     def _judge_deleted(self, occasion: Occasion, item: Operation, thing: _Thing, age_s: float) -> Iterator[Case]:
         """Judge a read of a deleted thing."""
         response = occasion.response
-        thing.absent |= response.status in _ABSENT
-        if response.ok and age_s > _SETTLES_S and not is_marked_deleted(read_json(response.body).value):
+        thing.absent |= response.status in ABSENT
+        if response.ok and age_s > SETTLES_S and not is_marked_deleted(read_json(response.body).value):
             expected = f"status 404 or 410, {age_s:.0f} s after {thing.change} was answered {thing.status}"
             case = self._case(_GONE, occasion, expected, cause=item.label, doubt=thing.doubt)
             # A thing that always exists is emptied by DELETE, or reset.
@@ -424,7 +424,7 @@ class Memory:
                 yield case
             elif len(self._back[item.template]) < _MOST_PENDING:
                 self._back[item.template].append(case)
-        elif response.status in _ABSENT and not thing.own:
+        elif response.status in ABSENT and not thing.own:
             self._gone.add(item.template)
             yield from self._back.pop(item.template, [])
 
@@ -433,18 +433,19 @@ class Memory:
         above = self._things.get(path.rpartition("/")[0].casefold())
         if above is not None and above.absent and "404" in operation.responses:
             age_s, last = occasion.sent_s - above.changed_s, singular(path.rpartition("/")[2])
-            if last in above.ends and age_s > _SETTLES_S:
+            if last in above.ends and age_s > SETTLES_S:
                 expected = f"status 404, as {above.change} ended the {last} too, by the description"
                 cause = f"{operation.label} below"
                 yield self._case(_GONE, occasion, expected, cause=cause, doubt=SENTENCE)
         item = self._of_collections.get(operation.template.rstrip("/"))
         gone = {key: one for key, one in self._things.items() if one.absent and one.path.rpartition("/")[0] == path}
+        gone = {key: one for key, one in gone.items() if one.gone}
         if item is None or not gone or not is_json(occasion.response.media_type):
             return
         for value in items_of(read_json(occasion.response.body).value) or ():
             thing = gone.get(f"{path}/{identifier_of(value, item)}".casefold()) if isinstance(value, dict) else None
             age_s = occasion.sent_s - thing.changed_s if thing is not None else 0.0
-            if thing is not None and age_s > _SETTLES_S and not is_marked_deleted(value):
+            if thing is not None and age_s > SETTLES_S and not is_marked_deleted(value):
                 expected = f"a list without what {thing.change} has deleted {age_s:.0f} s before, which no GET finds"
                 cause = f"{operation.label} listed"
                 yield self._case(_GONE, occasion, expected, "a list with it", cause=cause)
@@ -478,13 +479,19 @@ class Memory:
             other = next(differences({name: wanted}, now, schema, item.shape, self._collections), "")
             kept = item.template, name
             if not other:
+                if is_reordered(wanted, now.get(name), parts_of(schema).get(name)):
+                    thing.differs[name] += 1
+                    if thing.differs[name] == _SEEN:
+                        expected, cause = f"{clip(wanted)} as {name}, as {operation.label} wrote it", item.label
+                        found = f"{clip(now.get(name))} as {name}"
+                        yield self._case(_READ, occasion, expected, found, cause=f"{cause} {name} order", doubt=SET)
                 thing.shown.setdefault(name, self._acts)
                 yield from self._lasts(kept, age_s, str(wanted)[:_SHOWN])
                 continue
             # Another thing may have become the default since this one was read.
             is_given_away = wanted is True and is_shared(name)
             was_lost = not is_given_away and name in thing.shown and thing.shown[name] < self._acts
-            if was_lost or (name not in thing.shown and age_s > _SETTLES_S):
+            if was_lost or (name not in thing.shown and age_s > SETTLES_S):
                 thing.differs[name] += 1
                 if thing.differs[name] >= _SEEN:
                     when = "as it was read before" if was_lost else f"{age_s:.0f} s before"
@@ -528,7 +535,7 @@ def _unwritten(item: Operation, path: str, operations: Iterable[Operation]) -> f
 def _sent_of(occasion: Occasion) -> dict[str, Any]:
     """Return the members of a request's JSON object, with or without a description."""
     request = occasion.request
-    is_short = len(request.body) <= _MOST_OCTETS and is_json(request.media_type)
+    is_short = len(request.body) <= MOST_OCTETS and is_json(request.media_type)
     value = read_json(request.body).value if is_short else None
     return value if isinstance(value, dict) else {}
 

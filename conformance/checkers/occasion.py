@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.api.rest.request_context import RequestContext
@@ -17,6 +18,12 @@ from conformance.documents.parameters import plain_name
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.evidence import Case
 
+#: A device may carry out what a request asks for this long after its response, s.
+SETTLES_S: Final = 3.0
+#: Bodies of more bytes are not remembered.
+MOST_OCTETS: Final = 65_536
+#: Statuses of what is not there.
+ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 #: Methods that every server knows. A request with another method may never reach a resource.
 METHODS: Final = frozenset({"GET", "HEAD", "PUT", "POST", "DELETE", "PATCH", "OPTIONS"})
 

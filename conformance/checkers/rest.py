@@ -22,7 +22,7 @@ from conformance.checkers.occasion import Occasion
 from conformance.checkers.resources import Resources
 from conformance.checkers.texts import Texts
 from conformance.checkers.totals import Sublists
-from conformance.checkers.untouched import Copied, Untouched
+from conformance.checkers.untouched import Copied, Parts, Untouched
 from conformance.checkers.writes import Writes
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import resource_at
@@ -45,24 +45,22 @@ class Histories:
 
     def __init__(self, contract: Contract) -> None:
         self._contract = contract
-        self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
-        self._untouched, self._answers, self._commands = Untouched(contract), Answers(contract), Commands(contract)
-        self._copied = Copied()
+        self._memory = Memory(contract)
+        # Those that remember what a request of unknown effect may change.
+        self._states = (
+            Writes(contract), Changes(contract), Untouched(contract), Answers(contract), Commands(contract), Copied(),
+            Parts(contract),
+        )  # fmt: skip
         self._checkers = (
-            Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
-            self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(), Transitions(contract),
-            self._untouched, Sublists(contract), Entries(contract), self._answers, self._commands, self._copied,
+            Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory, *self._states,
+            Uniques(), declared.WriteOnly(), Contents(), Transitions(contract), Sublists(contract), Entries(contract),
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:
         """Forget states that a request of unknown effect may have changed."""
         self._memory.forget(deletes=deletes)
-        self._writes.forget()
-        self._changes.forget()
-        self._untouched.forget()
-        self._answers.forget()
-        self._commands.forget()
-        self._copied.forget()
+        for checker in self._states:
+            checker.forget()
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""

@@ -15,7 +15,7 @@ from conformance.api.rest.listing import COUNTS, TOTALS, Listing, Page, listing_
 from conformance.api.rest.references import singular
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import collection_of, parts_of
-from conformance.checkers.occasion import Occasion
+from conformance.checkers.occasion import SETTLES_S, Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import is_number, kinds_of
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
@@ -23,9 +23,7 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.verdict.evidence import Case
 
-#: SETTLES_S: a total may be stored apart from its list, and be late after a change, s. _OFTEN: reads in which it must
-#: be wrong.
-SETTLES_S: Final = 3.0
+# Reads in which a total must be wrong.
 _OFTEN: Final = 2
 # _CUTS: multiples at which servers cut a list silently. _FEWEST_CUT: its fewest items, with parameters or none.
 _CUTS: Final = (5, 16)

@@ -19,8 +19,9 @@ from conformance.api.rest.things import identifier_of, is_shared, parts_of
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_text import clip, read_json
-from conformance.documents.openapi import SAFE, Operation, is_json
+from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
 from conformance.verdict.evidence import Case
 
 #: A change after OFTEN refusals, and never between ALONE reads without one, is no chance. _OCTETS, _MOST: size and
@@ -202,6 +203,49 @@ class Copied:
             cause = f"{operation.label} of another"
             found = f"{clip(now.get(taken))} as {taken}, which another thing was sent"
             yield occasion.case("description/written-is-read", not taken, expected, found, cause=cause, doubt=doubt)
+
+
+class Parts:
+    """Judges whether a resource such as `/config/gripper` shows the same as that member of `/config`."""
+
+    def __init__(self, contract: Contract) -> None:
+        operations = operations_of(contract) if contract.openapi_path else ()
+        shapes = {one.template.rstrip("/"): one.shape for one in operations if one.method == "GET"}
+        # Path templates of such members, as far as clients write them.
+        self._parts = {
+            path
+            for path in (one.template.rstrip("/") for one in operations if one.method in {"PUT", "PATCH"})
+            for above, _, name in (path.rpartition("/"),)
+            if name in (own := parts_of(shapes.get(above))) and flat(own[name]) == flat(shapes.get(path) or {})
+        }
+        # By path: what reads have shown since the last change. Below: how often two differed.
+        self._values: dict[str, Any] = {}
+        self._count = Counter[str]()
+
+    def forget(self) -> None:
+        """Forget all reads: something else may have changed the resources."""
+        self._values.clear()
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        operation, answer = occasion.operation, occasion.response
+        if occasion.request.method not in SAFE:
+            self._values = {} if not refuses(answer.status, operation) else self._values
+        elif operation is not None and occasion.request.method == "GET" and answer.ok and occasion.context.plain:
+            path, template = occasion.context.target.rstrip("/"), operation.template.rstrip("/")
+            value = self._values[path] = read_json(answer.body).value if len(answer.body) < _OCTETS else None
+            above, _, name = path.rpartition("/")
+            whole = self._values.get(above) if template in self._parts else None
+            pairs = [(name, whole[name], value)] if isinstance(whole, dict) and name in whole else []
+            for one, inner in value.items() if isinstance(value, dict) else ():
+                known = f"{template}/{one}" in self._parts and f"{path}/{one}" in self._values
+                pairs += [(one, inner, self._values[f"{path}/{one}"])] if known else []
+            for one, inner, part in pairs:
+                self._count[one] += not same(inner, part)
+                if same(inner, part) or self._count[one] >= _TWICE:
+                    expected, found = f"{clip(part)} as {one}, as its own resource shows it", clip(inner)
+                    id_, doubt = "description/written-is-read", "one of them may be what is in effect"
+                    yield occasion.case(id_, same(inner, part), expected, found, cause=f"{one} part", doubt=doubt)
 
 
 def _is_list_of_things(value: Any) -> bool:

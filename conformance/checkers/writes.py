@@ -22,11 +22,13 @@ from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, merged, 
 from conformance.api.rest.references import collections_of, is_free_text
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import (
+    SET,
     WHOLE,
     Leaf,
     differences,
     is_devices,
     is_moved,
+    is_reordered,
     is_shared,
     leaves_of,
     left_out_of,
@@ -34,7 +36,7 @@ from conformance.api.rest.things import (
     says_exactly,
 )
 from conformance.checkers.entity_tags import judge_revision
-from conformance.checkers.occasion import Occasion
+from conformance.checkers.occasion import MOST_OCTETS, SETTLES_S, Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.json_text import clip, read_json
@@ -45,9 +47,6 @@ from conformance.verdict.evidence import Case
 
 _NOT_NOW: Final = HTTPStatus.ACCEPTED
 _MOST: Final = 1_000
-# A device may carry out a write this long after its response, s.
-_SETTLES_S: Final = 3.0
-_MOST_OCTETS: Final = 65_536
 # Responses that must show a habit of the device before it counts.
 _SEEN: Final = 2
 # Whole numbers beyond this are not exact as doubles (RFC 8259 6).
@@ -77,7 +76,6 @@ _KEPT, _DEFAULTS = "description/refused-keeps", "description/defaults"
 # What a right device may do with a value.
 _COARSE: Final = "it may keep numbers only as finely as it can set or measure them"
 _LINES: Final = "it may end lines of a text in its own way"
-_SET: Final = "it may keep the numbers as a set, in which neither order nor repetition counts"
 
 
 class _State(NamedTuple):
@@ -209,7 +207,7 @@ class Writes:
             return
         state = self._states.get(path) if item is not None else None
         writes, last, late = self._writes.get(path, []), self._last.get(path, {}), self._late.get(path)
-        if item is not None and len(request.body) <= _MOST_OCTETS and len(self._accepted) < _MOST:
+        if item is not None and len(request.body) <= MOST_OCTETS and len(self._accepted) < _MOST:
             value = read_json(request.body).value
             self._accepted[path] = value if isinstance(value, dict) else {WHOLE: value}
         self.forget()
@@ -233,7 +231,7 @@ class Writes:
         now = occasion.members(parts_of(item.shape))
         state, writes = self._states.pop(path, None), self._writes.pop(path, [])
         sent_s, late = occasion.sent_s, self._late.pop(path, None)
-        if state is not None and state.at_s <= sent_s and len(response.body) <= _MOST_OCTETS:
+        if state is not None and state.at_s <= sent_s and len(response.body) <= MOST_OCTETS:
             names = {*now, *state.members}
             changed = [name for name in names if not same(now.get(name), state.members.get(name))]
             self._moving |= {(item.template, name) for name in changed if not writes}
@@ -247,7 +245,7 @@ class Writes:
             is_late = writes and late is not None and shows_new(read_json(late.request.body).value, state.members, now)
             if write is not None and (state.at_s <= write.sent_s or write is late) and not is_late:
                 moving = frozenset(one for one in names if (item.template, one) in self._moving)
-                is_old = sent_s - write.response.received_s > _SETTLES_S
+                is_old = sent_s - write.response.received_s > SETTLES_S
                 if is_old or write is not late:
                     yield from self._judge_write(occasion, item, write, _Sandwich(state.members, now, moving, is_old))
                 if write.response.ok and not changed and not is_old:
@@ -258,7 +256,7 @@ class Writes:
 
     def _judge_write(self, occasion: Occasion, item: Operation, write: Occasion, reads: _Sandwich) -> Iterator[Case]:
         operation, request = write.operation, write.request
-        is_readable = is_json(request.media_type) and len(request.body) <= _MOST_OCTETS
+        is_readable = is_json(request.media_type) and len(request.body) <= MOST_OCTETS
         if operation is None or request.media_type not in operation.bodies or not is_readable or not reads.now:
             return
         change = _Change(write, operation, *reads)
@@ -365,7 +363,7 @@ class Writes:
         then, now = _moment(change.now.get(stamp)), _moment(change.write.response.header("date"))
         is_same = same(change.before.get(stamp), change.now[stamp])
         is_record = is_same and any(text.startswith("created") for text in names)
-        if not (is_record and is_changed and then and now) or (now - then).total_seconds() <= _SETTLES_S:
+        if not (is_record and is_changed and then and now) or (now - then).total_seconds() <= SETTLES_S:
             return
         doubts = self._doubts[change.operation.label, f"{stamp} stays"]
         doubts.add(change.write.request.body)
@@ -410,7 +408,7 @@ class Writes:
                 doubt = _LINES if value.splitlines() == now.splitlines() else ""
             elif isinstance(value, list) and isinstance(now, list) and not same(now, was):
                 wrong = self._items(name, value, now, part)
-                doubt = _SET if all(map(is_number, value)) else ""
+                doubt = SET if set(map(clip, value)) == set(map(clip, now)) else ""
             else:
                 continue
             expected = f"{clip(value)} as {name}, as {change.label} wrote it"
@@ -452,10 +450,10 @@ class Writes:
                 if text := next(differences(one, other, inner, None, self._collections), ""):
                     return f"{text} in an item of {name}"
         is_plain = all(map(is_number, (*value, *now))) and not part.get("uniqueItems")
-        is_other = is_plain and len(value) == len(now) and sorted(value) == sorted(now) and value != now
+        is_other = is_reordered(value, now, part)
         is_fewer = is_plain and len(now) < len(value) and set(value) == set(now)
         if all(isinstance(item, str) and item.strip() == item != "" for item in (*value, *now)):
-            # A device may leave out what is there twice, and order texts as it likes.
+            # A device may leave out what is there twice, and sort texts.
             is_fewer = set(now) < set(value) or (set(now) > set(value) and name == WHOLE)
         return f"{clip(now)} as {name}" if is_other or is_fewer else ""
 

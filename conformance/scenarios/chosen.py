@@ -23,15 +23,15 @@ from conformance.documents.json_schema import kinds_of
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import Parameter, plain_name
 from conformance.documents.representation import flat
+from conformance.scenarios.list_queries import many_items
 from conformance.scenarios.living import Kind, Living, State, Thing, is_stored
 from conformance.scenarios.whole_list import WholeList, read_whole
 from conformance.scenarios.writing import members
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import SENTENCE
 
-# _FILTERS: filters that are tried. _MOST_ITEMS: items of a list.
+# Filters that are tried.
 _FILTERS: Final = 2
-_MOST_ITEMS: Final = 1000
 _ACCEPTED: Final = 202
 # Phrases in a description which say that a number counts what exists now; below, what ever existed.
 _NOW: Final = re.compile(
@@ -129,11 +129,9 @@ class Chosen:
                 self._count(read, value, len(lists[value].items), thing, after)
 
     def _list(self, listing: Listing, thing: Thing, query: dict[str, Any]) -> WholeList:
-        limit = listing.limit
-        most = flat(limit.schema).get("maximum") if limit is not None else None
-        many = {limit.name: min(most, _MOST_ITEMS)} if limit is not None and isinstance(most, int) else {}
         path = thing.path.rstrip("/").rpartition("/")[0] + ("/" if listing.operation.template.endswith("/") else "")
-        return read_whole(self.living.writer, listing.operation, self.living.read, path, {**many, **query})
+        always = {**many_items(listing), **query}
+        return read_whole(self.living.writer, listing.operation, self.living.read, path, always)
 
     def _set(self, thing: Thing, change: Operation, name: str, value: Any) -> Exchange | None:
         """Give a member of a thing another value; return the request if it reads so, else None."""

@@ -15,7 +15,8 @@ from conformance.api.rest.listing import items_of
 from conformance.api.rest.things import collection_of, creator_of, identifier_of, object_in, parts_of
 from conformance.api.rest.variations import Kind, Variation
 from conformance.checkers.changes import ENDING, barred_by
-from conformance.checkers.commands import LIVE, SETTLES_S, Command, commands_of
+from conformance.checkers.commands import LIVE, Command, commands_of
+from conformance.checkers.occasion import SETTLES_S
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name

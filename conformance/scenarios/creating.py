@@ -30,11 +30,7 @@ def created_path(
 ) -> str:
     """Create a thing; return the path by which it is read, as far as the response says where it is, or nothing.
 
-    Args:
-        surveyor: sends the requests.
-        create: operation that creates it.
-        read: operation that reads it.
-        statuses: of a creation that counts. With 202, a thing may come later, or end by itself.
+    With the status 202 among those of a creation that counts, a thing may come later, or end by itself.
     """
     usual = usual_inputs(create, surveyor.values)[:2]
     body = with_texts(create, usual[0].body)

@@ -27,13 +27,7 @@ def draw_requests(
 ) -> Iterator[list[Variation]]:
     """Yield the valid, the invalid and the odd requests that are sent to an operation.
 
-    Args:
-        operation: the operation.
-        usual: values of its usual request.
-        values: those that the device gave.
-        effort: how many are drawn.
-        seed: of the run.
-        slow: labels of operations that get fewer; looked into when a group is drawn.
+    Operations whose labels are in ``slow`` when a group is drawn get fewer.
     """
     valid = list(islice(valid_variations(operation, usual, values), _CASES))
     if not operation.safe:

@@ -29,12 +29,7 @@ _CHANGES: Final = ("PATCH", "PUT")
 
 
 def change_entries(surveyor: Surveyor, operations: Mapping[tuple[str, str], Operation]) -> None:
-    """Write to lists whose entries no operation reads by themselves.
-
-    Args:
-        surveyor: sends the requests.
-        operations: those that may be called, by method and path.
-    """
+    """Write to lists whose entries no operation reads by themselves."""
     read = {collection_of(template) for method, template in operations if method == "GET"}
     lists = (
         (create, lister, listing)

@@ -86,9 +86,9 @@ def whole_query(listing: Listing, page: Page) -> dict[str, Any]:
     """Return a limit with which the whole list comes, by its total or as many as may be; nothing where not needed."""
     total, limit = max(page.totals.values(), default=0) + _MORE, listing.limit
     is_cut = len(page.items) + _MORE < total or 0 < listing.most({}) <= len(page.items)
-    most = flat(limit.schema).get("maximum") if limit is not None and not page.totals else None
-    total = min(most, _MOST_ITEMS) if isinstance(most, int) else total
-    return {limit.name: total} if limit is not None and is_cut and fitting(limit, total) else {}
+    found = {} if page.totals else many_items(listing)
+    found = found or ({limit.name: total} if limit is not None and fitting(limit, total) else {})
+    return found if is_cut else {}
 
 
 def _beyond(value: Any, *, is_least: bool) -> str | None:
@@ -142,11 +142,15 @@ def _together(listing: Listing, page: Page) -> list[dict[str, Any]]:
     return list(found.values())[:_TOGETHER]
 
 
+def many_items(listing: Listing) -> dict[str, Any]:
+    """Return a limit with as many items as may be, where the description says how many that is."""
+    most = flat(listing.limit.schema).get("maximum") if listing.limit is not None else None
+    return {listing.limit.name: min(most, _MOST_ITEMS)} if listing.limit is not None and isinstance(most, int) else {}
+
+
 def choosing(listing: Listing, thing: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield the queries of a list that choose a thing by a member, or sort all, with as many items as may be."""
-    limit, own = listing.limit, members_of(thing)
-    most = flat(limit.schema).get("maximum") if limit is not None else None
-    many = {limit.name: min(most, _MOST_ITEMS)} if limit is not None and isinstance(most, int) else {}
+    own, many = members_of(thing), many_items(listing)
     found = [(one, own.get(name)) for name, one in listing.filters.items()]
     usable = [(one, value) for one, value in found if isinstance(value, str | int) and fitting(one, value)][:_FILTERS]
     usable += [(listing.sort, text) for text in islice(listing.sortings, 1) if listing.sort is not None]

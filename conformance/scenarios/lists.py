@@ -30,7 +30,8 @@ from conformance.api.rest.references import in_link
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import NO_FORMAT
 from conformance.checkers.lists import is_mixed
-from conformance.checkers.totals import SETTLES_S, says_filtered
+from conformance.checkers.occasion import SETTLES_S
+from conformance.checkers.totals import says_filtered
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.openapi import operations_of
 from conformance.documents.parameters import plain_name

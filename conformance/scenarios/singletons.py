@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 from conformance.api.call_rules import HARMFUL, words_of
+from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.inputs import request_of, usual_inputs
 from conformance.api.rest.samples import alike_and_apart, fits
 from conformance.api.rest.things import another, differences, is_devices
@@ -114,7 +115,9 @@ def _write_values(writer: Writer, read: Operation, write: Operation) -> list[Wri
         sent = [(one, _write(writer, read, write, one, before)) for one in others if write.method == "PUT"]
         restored = _write(writer, read, write, value, before) if sent else []
         is_kept = bool(words_of(read.template) & _KEEPING) or any(made and not made[-1].other for _, made in sent)
-        return [one for _, made in (*sent, (value, restored)) for one in made] if is_kept else []
+        doubt = "" if is_kept else "GET may show what the device does, and not what it was told"
+        made = (one for _, writes in (*sent, (value, restored)) for one in writes)
+        return [replace(one, doubt=one.doubt or doubt) for one in made]
     parts = flat(schema).get("properties", {})
     first = {
         name: one
@@ -186,10 +189,19 @@ def _body(done: Write) -> dict[str, Any]:
 
 def _write(writer: Writer, read: Operation, write: Operation, body: Any, before: Exchange) -> list[Write]:
     """Write a value; return it with the reads on the same and on another connection; empty if it is refused."""
+    # What it is a part of, or is part of it, shows the same.
+    path = read.template.rstrip("/")
+    near = [
+        one
+        for (method, other), one in callable_operations(writer.api).items()
+        if method == "GET" and not one.parameters
+        if path == other.rstrip("/").rpartition("/")[0] or other == path.rpartition("/")[0]
+    ]
     sent = writer.conditional(write, read, "", body)
     if not sent.response.ok or sent.response.status == _ACCEPTED:
         return []
     done = writer.read_back(write, read, "", sent, before=before)
+    list(map(writer.send, near))
     return [done] if done.other else [done, writer.read_back(write, read, "", sent, before=before, fresh=True)]
 
 

@@ -44,12 +44,7 @@ def special_bodies(
 ) -> Iterator[Any]:
     """Yield bodies for writes that are each followed by a read; the last one restores the first values.
 
-    Args:
-        change: the write.
-        read: the read.
-        now: returns the members that were last read.
-        values: those that the run knows.
-        may: returns whether a member of this name may get another value.
+    They change members for whose names ``may`` holds; ``now`` returns those that were last read.
     """
     usual, first = usual_inputs(change, values)[0], now()
     schema = change.bodies[usual.media_type].schema

@@ -69,13 +69,7 @@ class Walk:
 
 
 class _Walker:
-    """Leads one device through its states.
-
-    Args:
-        api: its interface.
-        states: its map.
-        clock: the run's.
-    """
+    """Leads one device through its states."""
 
     def __init__(self, api: RestInterface, states: StateMap, clock: Clock) -> None:
         self._api, self._map, self._clock = api, states, clock

@@ -90,15 +90,7 @@ def read_whole(
 
 
 def _next(lister: Operation, exchange: Exchange, page: Page, count: int, number: int) -> dict[str, Any] | None:
-    """Return the query of the next page, or None.
-
-    Args:
-        lister: the operation that lists.
-        exchange: the last response.
-        page: the list in it.
-        count: how many items there were so far.
-        number: that of the page, from 1.
-    """
+    """Return the query of the page after that with this number, from 1, up to which ``count`` items came; or None."""
     listing = listing_of(lister)
     if listing is not None and listing.cursor is not None:
         following = next(cursors(listing, exchange, page), None)

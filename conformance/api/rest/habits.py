@@ -12,11 +12,7 @@ _SLOW_MS = 1000.0
 
 
 class Habits:
-    """A checker that learns the device's server field, its slow operations, and the values that it refuses.
-
-    Args:
-        api: the robot's REST interface.
-    """
+    """A checker that learns the device's server field, its slow operations, and the values that it refuses."""
 
     def __init__(self, api: RestInterface) -> None:
         self._api = api

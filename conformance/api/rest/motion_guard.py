@@ -20,11 +20,7 @@ _SLOW = 0.1
 
 
 class MotionGuard:
-    """Examines and adapts random requests before they are sent.
-
-    Args:
-        api: the robot's REST interface.
-    """
+    """Examines and adapts random requests before they are sent."""
 
     def __init__(self, api: RestInterface) -> None:
         self._api = api

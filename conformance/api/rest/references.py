@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from itertools import pairwise
 from typing import Any, Final
 from urllib.parse import parse_qsl, urlsplit
 
@@ -65,9 +64,15 @@ _DEPTH: Final = 6
 
 def collections_of(operations: Iterable[Operation]) -> frozenset[str]:
     """Return the plain names of the collections whose items an API has paths for, in the singular."""
-    paths = [template.split("/") for template in {item.template for item in operations}]
-    found = {before.rpartition("}")[2] for parts in paths for before, part in pairwise(parts) if part.startswith("{")}
-    return frozenset(singular(name) for name in found if name)
+    known, names = {item.template.rstrip("/"): item for item in operations}, set[str]()
+    for path, item in known.items():
+        numbers = {one.name for one in item.parameter("path") if kinds_of(one.schema) == {"integer"}}
+        for end in re.finditer(r"/\{([^{}]+)\}", path):
+            above = path[: end.start()]
+            # Below a thing, whole numbers that nobody lists may be the places of an array.
+            if "{" not in above or above in known or end[1] not in numbers:
+                names.add(above.rpartition("/")[2])
+    return frozenset(singular(name) for name in names if name and not name.endswith("}"))
 
 
 def singular(name: str) -> str:

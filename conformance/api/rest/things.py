@@ -21,6 +21,8 @@ from conformance.documents.representation import flat
 # Ends of path parameters whose value may be a member of another name: ``item_pk`` is the item's ``id``.
 # WHOLE: the member that a document is of itself, if it is a list, a number, a text or a boolean.
 WHOLE: Final = "the whole"
+#: SET: why a list may read in another order.
+SET: Final = "it may keep the items as a set, in which neither order nor repetition counts"
 _NUMBERED: Final = ("id", "uuid", "guid", "pk", "key", "number")
 # Members that a device sets itself or does not return. ``on`` alone is a switch; ``season``, ``format`` and ``standby``
 # are other words.
@@ -186,17 +188,17 @@ def doubt_of_life(*operations: Operation) -> str:
 
 def another(schema: Schema, body: dict[str, Any], turn: int, collections: frozenset[str]) -> dict[str, Any]:
     """Return a body with another value of each member that the client may choose, as far as the schema allows it."""
-    changed, numbers = dict(body), set[float]()
+    changed, taken = dict(body), set[Any]()
     for name, part in flat(schema).get("properties", {}).items():
         if name not in body or is_devices(name, part, collections):
             continue
         for value in _others(part, body[name], turn, collections):
             if value != body[name] and fits(part, value) and fits(schema, {**changed, name: value}):
                 changed[name] = value
-                # Two equal numbers do not show that a device takes one for the other.
-                if not is_number(value) or value not in numbers:
+                # Two equal values do not show that a device takes one for the other.
+                if not isinstance(value, str | int | float) or isinstance(value, bool) or value not in taken:
                     break
-        numbers |= {changed[name]} if is_number(changed[name]) else set()
+        taken |= {changed[name]} if isinstance(changed[name], str | int | float) else set()
     return changed
 
 
@@ -231,8 +233,10 @@ def _others(schema: Schema, value: Any, turn: int, collections: frozenset[str]) 
     if isinstance(value, dict):
         found = [another(schema, value, turn, collections)]
     elif isinstance(value, list):
-        made = [alike_and_apart({**given, "minItems": count})[1] for count in (3, 2)]
+        made = [alike_and_apart({**given, "minItems": count})[1] for count in (3, 2, _MANY)]
         found = [one for one in made if one and not any(item in one[:place] for place, item in enumerate(one))]
+        # Not in the order of an alphabet.
+        found = [[*one[1:], one[0]] if all(isinstance(item, str) for item in one) else one for one in found]
     elif not found and isinstance(value, bool):
         found = [not value]
     elif not found and is_number(value) and kinds & {"number", "integer"}:
@@ -248,8 +252,11 @@ def _others(schema: Schema, value: Any, turn: int, collections: frozenset[str]) 
         found = list(given["examples"])
     elif not found and isinstance(value, str) and turn % 2:
         # A pattern need not tell all that a device demands, so it is only tried in every second turn.
-        digit = re.sub(r"\d(?=\D*$)", lambda last: str((int(last[0]) + turn) % 10), value)
-        found = [digit * 3, digit * 2, digit]
+        digit, other = (
+            re.sub(r"\d(?=\D*$)", lambda last: str((int(last[0]) + more) % 10), value)  # noqa: B023 - called at once
+            for more in (turn, turn + 1)
+        )
+        found = [digit * 3, digit * 2, digit, other]
     begin = turn % len(found) if found else 0
     yield from (*found[begin:], *found[:begin])
 
@@ -373,6 +380,17 @@ def is_devices(name: str, part: Any, collections: frozenset[str]) -> bool:
     # In lower case with a line between its words: ``created_at`` for ``createdAt``.
     snake = re.sub(r"[^A-Za-z0-9]+|(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
     return bool(marked or "const" in given or _OWN.search(snake) or refers(name, given, collections))
+
+
+def is_reordered(value: Any, now: Any, part: Any) -> bool:
+    """Return whether a list of numbers or texts reads in another order, as neither a set nor sorted texts may."""
+    given = flat(part) if isinstance(part, dict) else {}
+    is_set = given.get("uniqueItems") or (isinstance(given.get("items"), dict) and "enum" in flat(given["items"]))
+    if is_set or not (isinstance(value, list) and isinstance(now, list)) or value == now:
+        return False
+    is_text = all(isinstance(one, str) for one in (*value, *now))
+    is_plain = all(map(is_number, (*value, *now))) or (is_text and now != sorted(now, key=str.casefold))
+    return is_plain and sorted(value) == sorted(now)
 
 
 def is_shared(name: str) -> bool:

@@ -11,7 +11,7 @@ from urllib.parse import unquote, urlsplit
 
 from conformance.api.rest.listing import listing_of, page_of
 from conformance.api.rest.references import in_link, refers, singular, thing_of, values_in
-from conformance.api.rest.samples import backwards, fits, sample
+from conformance.api.rest.samples import backwards, entry_of, fits, sample
 from conformance.api.rest.unique import Unique
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
@@ -68,7 +68,7 @@ class Values:
         self._learn(value, 0)
         page = page_of(response, operation) if listing_of(operation) is not None else None
         items = page.items if page is not None else value if isinstance(value, list) else [value]
-        items = [*value] if isinstance(value, dict) and is_map(operation.shape) else items
+        items = [*value] if isinstance(value, dict) and "object" in kinds_of(entry_of(operation.shape) or {}) else items
         for item in items[:_REMEMBERED]:
             if isinstance(item, dict):
                 for name in IDS:
@@ -221,13 +221,6 @@ class Values:
         if isinstance(item, list):
             return known[: len(item)] if len(known) >= len(item) else item
         return known[0] if known else self.fill(item, schema, operation)
-
-
-def is_map(schema: Schema | None) -> bool:
-    """Return whether a schema is that of things by their identifiers: objects of any name, and no other members."""
-    given = flat(schema or {})
-    part = given.get("additionalProperties")
-    return not given.get("properties") and isinstance(part, dict) and "object" in kinds_of(part)
 
 
 def _last(template: str) -> str:

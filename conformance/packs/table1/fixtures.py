@@ -74,12 +74,7 @@ _GONE: Final = frozenset({403, 404, 405, 501})
 
 
 class Beats:
-    """Reads the state after each check, in an order that follows from the run's seed.
-
-    Args:
-        api: the robot's REST interface.
-        interfaces: all of them.
-    """
+    """Reads the state after each check, in an order that follows from the run's seed."""
 
     def __init__(self, api: RestInterface, interfaces: Interfaces) -> None:
         run = api.run

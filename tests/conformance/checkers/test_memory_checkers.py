@@ -319,6 +319,9 @@ RIGHT = {
     "a list with what was created again": [
         *(_post("1"), _delete("1"), _get("1", 404), _put("1", 201), 5.0, _jobs("", _job("1"))),
     ],
+    "a PUT of what another request has ended": [
+        *(_put("1", 201), _get("1"), _put("2", 201), _get("1", 404), _put("1", 201)),
+    ],
     "a UUID of the client's twice": [_key(_U1, id=_U1), _KEY_GONE, _key(_U1, id=_U1)],
     "two UUIDs": [_key(_U1), _KEY_GONE, _key(_U2)],
     "a name twice": [_post("1"), _delete("1"), _post("1")],

@@ -97,6 +97,7 @@ _BROKEN = {
     ),
     "resumed from stopped": (_RESUMED * 2, _STATES),
     "two run at once": ([(f"GET {number} 200", "running") for number in (1, 2, 1)], _STATES),
+    "resumed when told done": ([("POST /stop 200", "done"), ("POST /resume 200", "running")], _STATES),
     "launched beside another": (
         [("GET 1 200", "running"), ("POST 2/launch 200", "running"), ("GET 1 200", "running")],
         _STATES,
@@ -124,6 +125,7 @@ _RIGHT = {
         *(("GET . 200", "running", 1), ("GET . 200", "running", 2)), *_refused("start", 2, 3, 4),
     ],
     "a count of all refusals": [*_refused("start", 1, 2, 3)[:-2], *_refused("resume", 3, 4, 5)],
+    "resumed when told stopped, which may come later": [("POST /stop 200", "stopped"), ("POST /resume 200", "running")],
     "launched when another stops": [
         ("GET 1 200", "running"), ("POST 2/launch 200", "running"), ("GET 1 200", "stopped"),
     ],

@@ -119,6 +119,7 @@ _TWICE = [_op("test", "/mode", "off"), _op("replace", "/count", 9)]
 _END = [_op("replace", "/count", 9), _op("test", "/mode", "off")]
 #: Exchanges, and the requirement that they break.
 BROKEN = {
+    "words reversed": ([_get(), _put(**_WHOLE, words=["a", "b", "c"]), _get(words=["c", "b", "a"])], READ),
     "an earlier version is taken": (
         [_get("/guarded", version=2), _put("/guarded", **_WHOLE, version=1, told={"version": 3}),
          _get("/guarded", version=3)], STATES,
@@ -394,6 +395,7 @@ RIGHT = {
     "clamped": [
         _get(), _put(**{**_WHOLE, "gain": 50.5}), _get(gain=10), _put(**{**_WHOLE, "gain": 60.5}), _get(gain=10),
     ],
+    "words sorted": [_get(), _put(**_WHOLE, words=["c", "a", "b"]), _get(words=["a", "b", "c"])],
     "words as a set": [_get(), _put(**_WHOLE, words=["b", "a", "b"]), _get(words=["a", "b"])],
     "a mode that follows the gain": [
         *(_get("/merge"), _patch("/merge", {"gain": 2.5}), _get("/merge", gain=2.5, mode="off")),

@@ -28,11 +28,7 @@ Shown = dict[str, Any]
 
 
 class Goals:
-    """Judges the goals in all exchanges of one run.
-
-    Args:
-        url: returns the URL of a path.
-    """
+    """Judges the goals in all exchanges of one run."""
 
     def __init__(self, url: Callable[[str], str]) -> None:
         self._url = url(GOAL_PATH)

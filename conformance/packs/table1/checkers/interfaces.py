@@ -208,9 +208,6 @@ class Lists:
     """Judges the lists in all exchanges of one run.
 
     One over SOAP that differs counts where REST shows the same entries before and after it: a robot's graph may change.
-
-    Args:
-        url: returns the URL of a path.
     """
 
     def __init__(self, url: Callable[[str], str]) -> None:

@@ -50,11 +50,7 @@ _UNIT: Final = 1e-3
 
 
 class SoapResponses:
-    """Judges the SOAP responses of one run.
-
-    Args:
-        services: the robot's SOAP services.
-    """
+    """Judges the SOAP responses of one run."""
 
     def __init__(self, services: Iterable[SoapService]) -> None:
         self._services = {service.endpoint: service for service in services}
@@ -134,9 +130,6 @@ class SoapPoses:
 
     Their stamps do not run backwards, and a message between two equal ones over REST with its stamp is the same
     message.
-
-    Args:
-        url: returns the URL of a path.
     """
 
     def __init__(self, url: Callable[[str], str]) -> None:

@@ -17,11 +17,7 @@ _ASIDE_M = 0.0137
 
 
 class Examples:
-    """Returns values within one robot's limits, near its position and in its frames.
-
-    Args:
-        statement: the vendor's statement about the robot.
-    """
+    """Returns values within one robot's limits, near its position and in its frames."""
 
     def __init__(self, statement: Statement) -> None:
         self._statement = statement

@@ -150,12 +150,7 @@ class RefusedRequests(Listener):
         self._dropped.add(refused.request)
 
     def choose(self, services: Iterable[SoapService], effort: Effort) -> list[Refused]:
-        """Return as many of the requests as the effort allows: of each operation some, and first those that would act.
-
-        Args:
-            services: the robot's SOAP services.
-            effort: of the run.
-        """
+        """Return as many requests as the effort allows: of each operation some, and first those that would act."""
         count = max(_FEWEST, round(_COUNTS.get(effort.name, _COUNTS["standard"]) * effort.speed.share))
         clients = [self._rest, *(service.client for service in services)]
         if rate := self._rest.connection.request_rate:
@@ -243,13 +238,7 @@ def refuse_goal(robot: Robot) -> object:
 
 
 def no_commands(robot: Robot, soap: SoapServices, seed: str) -> list[Callable[[], object]]:
-    """Return requests that are refused or only read, some of another client, in an order set by the seed.
-
-    Args:
-        robot: the robot.
-        soap: its SOAP services.
-        seed: of the order.
-    """
+    """Return requests that are refused or only read, some of another client, in an order set by the seed."""
     away = soap.run.unreachable
     publishers = None if Interface.PUBLISHERS in away else soap.publishers
     subscribers = None if Interface.SUBSCRIBERS in away else soap.subscribers

@@ -48,8 +48,10 @@ def test_names_that_refer(name, schema, expected):
 
 
 def test_collections_are_those_whose_items_have_paths():
-    templates = ("/arm/valves/{id}", "/batteries/{b}/cells/{c}", "/speed")
+    templates = ("/arm/valves/{id}", "/batteries/{b}/cells/{c}", "/speed", "/batteries/{b}/steps/{n}")
     paths = {template: {"get": {"responses": {}}} for template in templates}
+    place = {"name": "n", "in": "path", "required": True, "schema": {"type": "integer"}}
+    paths["/batteries/{b}/steps/{n}"]["parameters"] = [place]
     assert collections_of(read_operations({"paths": paths})) == {"valve", "battery", "cell"}
 
 
