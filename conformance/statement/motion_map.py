@@ -136,7 +136,8 @@ class Goto(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         within_s: time to reach any target, where no template has "{seconds}".
         settle_s: time beyond either, s.
         beyond_limits: what the device does with a target beyond its limits: "refused", "clamped", or "undefined".
-        while_moving: what it does with a second move: it "displaces" the first, or is "refused".
+        while_moving: what it does with a second move: it "displaces" the first, or is "refused"; None: nobody says it,
+            and the device may make one move after the other, or several at once.
     """
 
     send: Call
@@ -147,7 +148,7 @@ class Goto(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     within_s: Positive = 10.0
     settle_s: NotNegative = 0.5
     beyond_limits: Beyond = "undefined"
-    while_moving: Literal["displaces", "refused"] = "displaces"
+    while_moving: Literal["displaces", "refused"] | None = None
 
 
 class Action(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -12,7 +12,7 @@ from conformance.scenarios.motion.measuring import speed_in
 from conformance.scenarios.motion.moves import many_commands, new_targets, repeated, stops, targets
 from conformance.scenarios.motion.resting import crept, fastest, set_out
 from conformance.scenarios.motion.several import several_clients, several_drivers
-from conformance.scenarios.motion.trace import Drive, Leg, Reading, middle_of
+from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading, middle_of
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.evidence import Case
@@ -159,12 +159,14 @@ def stop_lasts(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
 @rule("motion/new-target", on=(new_targets,))
 def new_target(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge a second target during a move: it displaces the first for good or is refused, as declared."""
-    refuses = motion.goto is not None and motion.goto.while_moving == "refused"
+    declared = motion.goto.while_moving if motion.goto else None
     for leg in trace:
         first, second = leg.commands[:2]
-        if not refuses:
-            yield from judge_goal(leg, second, motion)
-            yield from _given_up(leg, motion)
+        if declared is None and second.is_refused:
+            yield from judge_goal(leg, first, motion)
+        elif declared != "refused":
+            yield from _judge_last(leg, second, motion)
+            yield from _given_up(leg, motion) if declared else ()
         elif second.is_refused or _arrives_at(leg, motion) > second.answered:
             yield Case(second.is_refused, second.exchange, "4xx for a second move under way")
             if second.is_refused:
@@ -211,7 +213,21 @@ def _given_up(leg: Leg, motion: MotionMap) -> Iterator[Outcome]:
 def last_of_many(trace: Leg, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether the device ends at the last accepted of many targets."""
     accepted = [command for command in trace.commands if command.is_ok]
-    yield from judge_goal(trace, (accepted or list(trace.commands))[-1], motion)
+    yield from _judge_last(trace, (accepted or list(trace.commands))[-1], motion)
+
+
+def _judge_last(leg: Leg, goal: Command, motion: MotionMap) -> Iterator[Outcome]:
+    """Judge the target of the last of several moves; another one decides nothing if nobody says what displaces it."""
+    last = usable(leg)[-SEVERAL:]
+    others = [one for one in leg.commands if one.is_ok and last and not off(at(last, motion), one.targets, motion)]
+    for outcome in judge_goal(leg, goal, motion):
+        if not others or (motion.goto and motion.goto.while_moving) or not isinstance(outcome, Case) or outcome.holds:
+            yield outcome
+        else:
+            yield NotTested(
+                f"it rests at {in_words(others[0].targets)}, the target of another accepted move. A device that makes "
+                'its moves side by side may do so: write while_moving = "displaces" into the map if the last one counts'
+            )
 
 
 @rule("motion/repeated", on=(repeated,))

@@ -25,7 +25,7 @@ from conformance.scenarios.motion.templates import (
     seconds_of,
 )
 from conformance.scenarios.motion.trace import Command, Leg, Reading, middle_of
-from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
+from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, NotSeenError
 from conformance.statement.motion_map import Goto, MotionMap, Stop, Switch, Velocity, Way, names_in
 from conformance.transport.client import is_drafting
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError, NotPermittedError, Outgoing
@@ -38,6 +38,8 @@ _PACE_S: Final = 0.02
 _STOP_S: Final = 2.0
 # How long, and how often, a move is sent again while the device finishes the one before, s.
 _FINISHES_S, _AGAIN_S = 1.0, 0.05
+# _QUEUE_S: how long a device gets for moves one after the other, s. _NEXT_S: so long it rests between two at most, s.
+_QUEUE_S, _NEXT_S = 20.0, 0.5
 # How long a device without positions gets to come to rest, s.
 _RESTS_S: Final = 5.0
 
@@ -364,6 +366,33 @@ class MappedDevice:
             if self.clock.now() > self.due(command):
                 # A single reading after the end decides nothing.
                 return seen + [self.read() for _ in range(SEVERAL)]
+
+    def follow_several(
+        self, commands: Sequence[Command], others: Sequence[Position] = ()
+    ) -> tuple[list[Reading], float]:
+        """Watch until the last of several accepted moves is over; return the readings, and when it was due.
+
+        Where nobody says that it displaces the others, the device may make one after the other until it rests.
+
+        Raises:
+            NotSeenError: it does not come to rest.
+        """
+        accepted = [command for command in commands if command.is_ok]
+        last = (accepted or list(commands))[-1]
+        seen, due = self.follow(last, others) if accepted else [], self.due(last)
+        if len(accepted) > 1 and self.moves.while_moving is None:
+            most_s = min(len(accepted) * self.takes_s, _QUEUE_S)
+            seen += self.watch(max(self.clock.now(), last.answered + most_s) + 2 * _NEXT_S, self._has_rested)
+            due = max(due, seen[-SEVERAL:][0].sent)
+            if not self._has_rested(seen):
+                raise NotSeenError(f"it still moves {seen[-1].sent - last.answered:.1f} s after the last of its moves")
+        return seen, due
+
+    def _has_rested(self, readings: Sequence[Reading]) -> bool:
+        """Return whether the last readings show rest for so long that no further move follows."""
+        last = [reading for reading in readings if reading.sent >= readings[-1].sent - _NEXT_S]
+        stays = all(self.is_near(reading.values, last[0].values) for reading in last)
+        return len(last) < len(readings) and stays and self.saw_rest(last)
 
     def due(self, command: Command) -> float:
         """Return when the target of a command must have been reached, s of the clock."""

@@ -240,11 +240,11 @@ def _to_new_targets(mapped: MappedDevice, effort: Effort, run: Run) -> Iterator[
     for name in _axes(mapped, effort):
         way = _way(mapped, name)
         second = mapped.goto(way.behind)
-        last = second if second.is_ok else way.command
         first_s = min(mapped.takes_s, way.lasts_s(name))
-        seen = way.readings + mapped.follow(last)
+        followed, due = mapped.follow_several([way.command, second])
+        seen = way.readings + followed
         seen += mapped.watch(max(mapped.clock.now(), way.command.answered + first_s) + longer_s, ask)
-        yield Leg(f"back, with {name} under way", way.start, (way.command, second), tuple(seen), mapped.due(last))
+        yield Leg(f"back, with {name} under way", way.start, (way.command, second), tuple(seen), due)
 
 
 @scenario(needs=_NEEDS, stage=Stage.MOTION)
@@ -274,10 +274,10 @@ def _in_a_row(mapped: MappedDevice, what: str, wanted: list[Position]) -> Leg:
     start = mapped.where()
     commands = [mapped.goto(item) for item in wanted]
     last = next((command for command in reversed(commands) if command.is_ok), commands[-1])
-    seen = tuple(mapped.follow(last)) if last.is_ok else ()
+    seen, due = mapped.follow_several(commands)
     if seen and not mapped.is_near(seen[-1].values, last.targets):
         need_reached_alone(mapped, start, last.targets)
-    return Leg(what, start, tuple(commands), seen, mapped.due(last))
+    return Leg(what, start, tuple(commands), tuple(seen), due)
 
 
 def need_reached_alone(mapped: MappedDevice, start: Position, target: Position) -> None:

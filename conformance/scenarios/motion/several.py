@@ -60,7 +60,7 @@ def _of_clients(mapped: MappedDevice) -> Leg:
     for command in commands:
         if command.is_ok:
             mapped.note(command.exchange)
-    seen = mapped.follow(commands[-1], wanted)
+    seen, due = mapped.follow_several(commands, wanted)
     here = seen[-1].values if seen else {}
     if here and not any(mapped.is_near(here, item) for item in wanted):
         need_reached_alone(
@@ -68,7 +68,7 @@ def _of_clients(mapped: MappedDevice) -> Leg:
             start,
             min(wanted, key=lambda item: sum(abs(axis.apart(here[name], item[name])) for name, axis in axes)),
         )
-    return Leg("targets of several clients", start, tuple(commands), tuple(seen), mapped.due(commands[-1]))
+    return Leg("targets of several clients", start, tuple(commands), tuple(seen), due)
 
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)

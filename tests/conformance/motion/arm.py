@@ -29,6 +29,7 @@ seconds = 0.5
 settle_s = 0.3
 tolerance = 0.02
 beyond_limits = "refused"
+while_moving = "displaces"
 
 [motion.action]
 read = "GET /moves/{goto:/id}"

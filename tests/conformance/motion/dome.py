@@ -40,6 +40,7 @@ within_s = 0.6
 settle_s = 0.2
 tolerance = 0.03
 beyond_limits = "refused"
+while_moving = "displaces"
 
 [motion.velocity]
 send = "POST /PTZPort/ContinuousMove"

@@ -55,6 +55,7 @@ def motion_map_of(statement: Statement, area: tuple[float, float, float, float])
         "send": f"PUT {_GOAL}",
         "body": {"goal": {"target_pose": {"header": {"frame_id": motion.frame}, "pose": pose}}},
         "tolerance": arrives_m,
+        "while_moving": "displaces",
         "within_s": round(_TURNS_S + _SLOWER * way / limits.navigation_m_s, 1),
         "settle_s": limits.settle_s,
     }

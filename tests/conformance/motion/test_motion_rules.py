@@ -77,6 +77,13 @@ def test_a_right_device_breaks_no_rule_at_quick(name, seed):
     assert _failed(name, noise=0.004 if seed % 2 else 0.0, seed=seed, effort="quick")[0] == set()
 
 
+@pytest.mark.parametrize("mutant", ["second-queued", "second-ignored"])
+def test_what_becomes_of_a_second_move_is_judged_where_the_map_says_it(mutant):
+    change, toml = MUTANTS["arm"][mutant], MAP.replace('while_moving = "displaces"\n', "")
+    assert _failed("arm", change, effort="quick")[0] & {"motion/new-target", "motion/last-of-many"}
+    assert _failed("arm", change, effort="quick", toml=toml)[0] == set()
+
+
 @pytest.mark.parametrize("name", ["arm", "rover"])
 def test_a_trace_is_judged_alike_after_it_was_stored(name, tmp_path):
     made = list(played(name, MUTANTS[name]["stop-late"], noise=0.004, seed=1))

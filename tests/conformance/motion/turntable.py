@@ -34,6 +34,7 @@ within_s = 1
 settle_s = 0.3
 tolerance = 0.03
 beyond_limits = "refused"
+while_moving = "displaces"
 
 [motion.stop]
 send = "PUT /telescope/{device_number}/abort"
