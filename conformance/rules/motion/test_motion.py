@@ -160,19 +160,26 @@ def stop_lasts(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
 def new_target(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge a second target during a move: it displaces the first for good or is refused, as declared."""
     declared = motion.goto.while_moving if motion.goto else None
-    for leg in trace:
-        first, second = leg.commands[:2]
-        if declared is None and second.is_refused:
+    for _, tries in itertools.groupby(trace, key=lambda leg: leg.what):
+        # Of several tries of one move, those that show nothing are left out if another one shows something.
+        found = [list(_judge_second(leg, declared, motion)) for leg in tries]
+        shown = [outcomes for outcomes in found if any(isinstance(one, Case) for one in outcomes)]
+        yield from itertools.chain.from_iterable(shown or found[-1:])
+
+
+def _judge_second(leg: Leg, declared: str | None, motion: MotionMap) -> Iterator[Outcome]:
+    first, second = leg.commands[:2]
+    if declared is None and second.is_refused:
+        yield from judge_goal(leg, first, motion)
+    elif declared != "refused":
+        yield from _judge_last(leg, second, motion)
+        yield from _given_up(leg, motion) if declared else ()
+    elif second.is_refused or _arrives_at(leg, motion) > second.answered:
+        yield Case(second.is_refused, second.exchange, "4xx for a second move under way")
+        if second.is_refused:
             yield from judge_goal(leg, first, motion)
-        elif declared != "refused":
-            yield from _judge_last(leg, second, motion)
-            yield from _given_up(leg, motion) if declared else ()
-        elif second.is_refused or _arrives_at(leg, motion) > second.answered:
-            yield Case(second.is_refused, second.exchange, "4xx for a second move under way")
-            if second.is_refused:
-                yield from judge_goal(leg, first, motion)
-        else:
-            yield NotTested("the device may have arrived before it got the second move")
+    else:
+        yield NotTested("the device may have arrived before it got the second move")
 
 
 def _arrives_at(leg: Leg, motion: MotionMap) -> float:

@@ -40,6 +40,8 @@ _STOP_S: Final = 2.0
 _FINISHES_S, _AGAIN_S = 1.0, 0.05
 # _QUEUE_S: how long a device gets for moves one after the other, s. _NEXT_S: so long it rests between two at most, s.
 _QUEUE_S, _NEXT_S = 20.0, 0.5
+# _LINK_S: how long responses are watched, s. _SLOWER: times that a later one may be slower than those.
+_LINK_S, _SLOWER = 2.0, 3.0
 # How long a device without positions gets to come to rest, s.
 _RESTS_S: Final = 5.0
 
@@ -325,6 +327,12 @@ class MappedDevice:
             readings.append(self.read())
             if late or is_over(readings):
                 return readings
+
+    def measure_link(self) -> None:
+        """Measure once more how slow responses are, as a busy machine may have held one back long ago."""
+        slowest_s, self.room.slowest_s = self.room.slowest_s, 0.0
+        self.watch(self.clock.now() + _LINK_S)
+        self.room.slowest_s = min(slowest_s, _SLOWER * self.room.slowest_s)
 
     def is_near(self, here: Mapping[str, float], there: Mapping[str, float]) -> bool:
         """Return whether a position is another one, within the tolerances."""

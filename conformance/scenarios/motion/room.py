@@ -168,23 +168,31 @@ class Room:
     def is_over(self, choices: Sequence[Speeds], readings: Sequence[Reading], rests_s: float) -> bool:
         """Return whether a drive has to end, as the device would pass a limit if it rested ``rests_s`` later."""
         seen = [reading for reading in readings if reading.values][-SEVERAL:]
-        if len(seen) < SEVERAL:
+        if not seen:
             return False
+        # A busy machine that has just paused the suite may do so again.
+        paused_s = max((two.sent - one.sent for one, two in itertools.pairwise(seen)), default=0.0)
+        blind_s = max(self._blind_s, min(paused_s, self._most_blind_s))
         for name, axis in self._axes.items():
-            here, (down, up) = middle_of(seen, name), self._way(name, choices, rests_s + self._blind_s)
+            here, (down, up) = middle_of(seen, name), self._way(name, choices, rests_s + blind_s)
             if (down and here - down < axis.limits[0]) or (up and here + up > axis.limits[1]):
                 return True
         return False
 
     def leads_on(self, speeds: Speeds, readings: Sequence[Reading], lasts_s: float) -> bool:
-        """Return whether a device that is under way has room for another velocity, for so long, s."""
-        return not self.is_over([speeds], readings, _FASTER * lasts_s + self._blind_s)
+        """Return whether a device that is seen under way has room for another velocity, for so long, s."""
+        is_seen = sum(bool(reading.values) for reading in readings) >= SEVERAL or not self._axes
+        return is_seen and not self.is_over([speeds], readings, _FASTER * lasts_s + self._blind_s)
 
     @property
     def _blind_s(self) -> float:
         """How long a device may drive on unseen, s: after a command that came late, no longer than its hold time."""
+        return min(_BLIND * self.slowest_s, self._most_blind_s)
+
+    @property
+    def _most_blind_s(self) -> float:
         hold_s = self._motion.velocity.hold_s if self._motion.velocity else None
-        return min(_BLIND * self.slowest_s, math.inf if hold_s is None else _HOLDS * hold_s)
+        return math.inf if hold_s is None else _HOLDS * hold_s
 
     def _unsure(self, axis: str) -> float:
         """Return how far apart two readings of a device at rest may be along an axis."""

@@ -46,6 +46,7 @@ def _read_states(mapped: MappedDevice) -> Iterator[Told]:
 
 def _told_of_a_drive(mapped: MappedDevice, wanted: set[str], side: int) -> Iterator[Told]:
     """Drive at all velocities at once, read them, and read them again at rest."""
+    mapped.measure_link()
     drives, requests = mapped.drives, SEVERAL * (2 + len(mapped.motion.state.agrees))
     lasts_s = drives.settle_s + requests * mapped.room.slowest_s + (drives.hold_s or 0.0) + drives.settle_s
     choices = [{name: _SHARE * drives.axes[name].limits[side] for name in wanted}]
