@@ -58,6 +58,15 @@ def slope(samples: Sequence[Sample]) -> float | None:
     return median(slopes) if slopes else None
 
 
+def scatter(samples: Sequence[Sample]) -> float:
+    """Return the standard deviation of a sample's noise, by how samples differ from the middle of their neighbours."""
+    values = [value for _, value in samples]
+    bends = [
+        abs(before - 2 * value + after) for before, value, after in zip(values, values[1:], values[2:], strict=False)
+    ]
+    return _SIGMA * median(bends) / math.sqrt(6) if bends else 0.0
+
+
 class Noise(NamedTuple):
     """Noise of a device at rest: the samples' offset from zero, and the standard deviation of one sample."""
 

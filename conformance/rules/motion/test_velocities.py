@@ -10,13 +10,12 @@ from conformance.rules.motion.judging import at, follows, is_each_late, must_res
 from conformance.scenarios.motion.measuring import end_of_travel, noise_of, speed_in
 from conformance.scenarios.motion.resting import crept, fastest
 from conformance.scenarios.motion.trace import Command, Drive, Reading
-from conformance.scenarios.motion.velocities import let_go, velocities
+from conformance.scenarios.motion.velocities import HELD, let_go, velocities
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.evidence import Case
 
-# Part of the hold time in which the device must still drive; least share of its velocity.
-_HELD = (0.2, 0.7)
+# Least share of its velocity at which the device must still drive within its hold time.
 _STILL_DRIVES = 0.5
 # Time that a velocity may hold beyond its hold time: as a share of it, and s.
 _LONGER, _LONGER_S = 0.4, 0.25
@@ -111,14 +110,14 @@ def _hold_window(drive: Drive, hold_s: float, share: float, motion: MotionMap) -
     in_part = motion.velocity is not None and any(way.axes < names for way in motion.velocity.ways)
     sent = drive.commands[-2].sent if in_part and len(drive.commands) > 1 else last.sent
     if refused is None:
-        return last.answered + _HELD[0] * hold_s, sent + share * hold_s
+        return last.answered + HELD[0] * hold_s, sent + share * hold_s
     return refused.answered + _SLOWS_S, sent + hold_s
 
 
 @rule("motion/hold", on=(let_go,))
 def hold(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a device that gets no command any more still drives within its hold time."""
-    return judge_hold(trace, motion, _HELD[1])
+    return judge_hold(trace, motion, HELD[1])
 
 
 def fails(outcomes: Iterable[Outcome]) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from statistics import median
 from typing import Final
 
-from conformance.measures.samples import FARTHEST, SEVERAL, Noise, Sample, goes_on, slope
+from conformance.measures.samples import FARTHEST, SEVERAL, Noise, Sample, goes_on, scatter, slope
 from conformance.scenarios.motion.trace import Reading, Resting
 from conformance.statement.motion_map import MotionMap
 
@@ -80,14 +80,24 @@ def _seen_of(
 ) -> Iterator[tuple[str, list[Sample], _Rate, Callable[[Sequence[Sample]], float]]]:
     """Yield for each axis its name, its samples, and functions for the rate of some and for the most of it at rest."""
     declared = motion.velocity.axes if motion.velocity else {}
+
+    def noisier(noise: Noise, seen: Sequence[Sample]) -> Noise:
+        """Return the noise before any move, or that of all these samples: a few at rest may show too little of it."""
+        return noise._replace(sigma=max(noise.sigma, scatter(seen)))
+
     for name, noise in resting.speeds.items():
         most = declared[name].rest or _OF_SPEED * motion.speed_tolerance(name)
         seen = [(reading.sent, reading.speeds[name]) for reading in readings if reading.speeds]
-        yield f"{name} at", seen, lambda samples: median(value for _, value in samples), _beside(most, noise.room)
+        yield (
+            f"{name} at",
+            seen,
+            lambda samples: median(value for _, value in samples),
+            _beside(most, noisier(noise, seen).room),
+        )
     for name, noise in resting.axes.items():
         most = motion.state.axes[name].rest or _OF_POSITION * motion.tolerance(name)
         seen = [((reading.sent + reading.received) / 2, reading.values[name]) for reading in readings if reading.values]
-        yield f"{name} by", seen, slope, _beside(most, noise.slope_room)
+        yield f"{name} by", seen, slope, _beside(most, noisier(noise, seen).slope_room)
 
 
 def crept(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -> str:

@@ -51,6 +51,8 @@ _LONGEST_HOLD_S: Final = 2.0
 # Parts of the hold time after which commands are sent that must be refused: after the first the device must still
 # drive; the second must renew nothing.
 _REFUSED_AT: Final = (0.1, 0.9)
+#: Part of the hold time in which the device must still drive.
+HELD: Final = (0.2, 0.7)
 # _KEPT: renewals of a velocity within its hold time. _KEPT_S: longest time between two, s.
 _KEPT: Final = 3
 _KEPT_S: Final = 0.1
@@ -361,10 +363,20 @@ def left_alone(
             drive = _let_go_of(mapped, drive, hold_s, refused, beside, silent_s=silent_s, brief=brief)
         if drive.refused is None or not drive.refused.is_ok:
             yield drive
-        if drive.was_kept(hold_s):
+        if drive.was_kept(hold_s) and (silent_s or _shows_hold(mapped, drive, hold_s)):
             return
     if not whole:
         raise NotPossibleError(f"the limits leave no room for {part.what}")
+
+
+def _shows_hold(mapped: MappedDevice, drive: Drive, hold_s: float) -> bool:
+    """Return whether readings within the hold time show velocities, or come too seldom for that on any try."""
+    last = drive.commands[-1]
+    begin, end = last.answered + HELD[0] * hold_s, last.sent + HELD[1] * hold_s
+    within = [reading for reading in drive.after if begin <= reading.sent and reading.received <= end]
+    if usual_s(drive.readings) > (HELD[1] - HELD[0]) * hold_s / SEVERAL:
+        return True
+    return all(speed_in(within, name, mapped.motion) is not None for name, wanted in drive.wanted.items() if wanted)
 
 
 def _unread(mapped: MappedDevice, speeds: Position, drive: Drive, links: ExitStack, gone: str) -> Command:

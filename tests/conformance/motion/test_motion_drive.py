@@ -13,7 +13,7 @@ import winch
 from arm import LIMITS, Arm
 from body import Body
 from driven_device import SimulatedClock
-from judged_devices import MOVES, RUNS
+from judged_devices import MOVES, RUNS, stays_within
 from processes import ended
 from rover import Rover, serving_rover
 from serving_apps import serving_app
@@ -54,21 +54,24 @@ class WokenByReading(Body):
 
 
 def _driven(url, tmp_path, *more, drive="PUT /velocity"):
-    out = tmp_path / "out"
+    out, saved = tmp_path / "out", tmp_path / "found.toml"
     done = ended(
         sys.executable, "-m", "roaas", "certify", url, "--drive", drive, "--allow-motion", "--yes",
-        "--effort", "quick", "--out", out, *more,
+        "--effort", "quick", "--out", out, "--save-map", saved, "--force", *more,
     )  # fmt: skip
     assert "Traceback" not in done.stdout + done.stderr, done.stderr
     result = json.loads((out / "result.json").read_text(encoding="utf-8")) if (out / "result.json").exists() else {}
+    if result:
+        judged = {one["id"]: one["verdict"] for one in result["requirements"]}
+        stays_within(out, saved.read_text(encoding="utf-8"), judged)
     return done, result, [one["answer"] for one in result.get("motion", ())]
 
 
 def test_the_axes_of_a_rover_are_found_and_the_four_questions_answered(tmp_path):
-    saved = tmp_path / "rover.toml"
+    saved = tmp_path / "found.toml"
     with serving_rover(Rover(Body(rover.LIMITS, noise=0.001))) as url:
         for _ in range(RUNS):  # a loaded machine may keep a run from seeing something; it never makes it fail
-            done, result, given = _driven(url, tmp_path, "--save-map", saved, "--force")
+            done, result, given = _driven(url, tmp_path)
             assert "no" not in given, done.stdout
             if given == ["yes"] * 4:
                 break
@@ -130,9 +133,9 @@ class Homing(Winch):
 
 
 def test_a_winch_gets_a_lease_and_is_enabled_and_homed_before_it_moves_and_is_left_as_it_was(tmp_path):
-    device, saved = Homing(), tmp_path / "winch.toml"
+    device, saved = Homing(), tmp_path / "found.toml"
     with serving_app(device.app()) as url:
-        done, _, given = _driven(url, tmp_path, "--save-map", saved, drive="PUT /speed")
+        done, _, given = _driven(url, tmp_path, drive="PUT /speed")
     assert "no" not in given, done.stdout
     assert given[0] == "yes", done.stdout + done.stderr
     assert "first sends POST /lease, POST /enable, POST /home" in done.stderr

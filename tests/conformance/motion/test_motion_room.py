@@ -10,7 +10,8 @@ from conformance.scenarios.motion import several
 from conformance.scenarios.motion.binding import SoapBinding
 from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import MappedDevice
-from conformance.scenarios.motion.trace import Drive
+from conformance.scenarios.motion.room import Room
+from conformance.scenarios.motion.trace import Drive, Reading
 
 
 def _without_goto(toml):
@@ -83,6 +84,22 @@ def test_a_device_that_is_beyond_a_limit_of_another_axis_is_brought_to_where_the
     mapped = MappedDevice(api, map_of(dome.MAP), clock, SoapBinding(api, dome.messages_of()))
     assert with_room(mapped, [{"pan": 0.5}], 0.7) == [{"pan": 0.5}]
     assert mapped.where()["tilt"] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("moments", "tilt", "leads_on", "is_over"),
+    [
+        ([0.0, 0.1], 0.0, False, False),  # two readings do not show where it will be
+        ([0.0, 0.1, 0.2], 0.0, True, False),
+        ([0.0, 0.1, 0.2], -0.45, False, False),
+        ([0.0, 0.1, 0.5], -0.35, False, True),  # a pause as long as the last one takes it beyond its limit
+    ],
+)
+def test_a_drive_leads_on_where_it_is_seen_and_ends_where_a_pause_may_follow(moments, tilt, leads_on, is_over):
+    room = Room(map_of(dome.MAP))
+    seen = [Reading(moment, moment, {"pan": 0.0, "tilt": tilt}, None, None) for moment in moments]
+    down = {"pan": 0.0, "tilt": -1.0}
+    assert (room.leads_on(down, seen, 0.4), room.is_over([down], seen, 0.0)) == (leads_on, is_over)
 
 
 @pytest.mark.parametrize("ends", [True, False])

@@ -10,8 +10,10 @@ from arm import MAP
 from careless import played as played_attempts
 from simulated import DEVICES, MUTANTS, RULES, cases_of, played
 
+from conformance.measures.samples import Noise
 from conformance.rules.motion import test_motion_attempts
-from conformance.scenarios.motion.trace import Quiet, Reading, Tried
+from conformance.scenarios.motion.resting import set_out
+from conformance.scenarios.motion.trace import Quiet, Reading, Resting, Tried
 from conformance.scenarios.scenario import Recording, Recordings
 from conformance.scenarios.stored import TRACES_NAME, read_traces, write_traces
 from conformance.statement.motion_map import MotionMap
@@ -118,6 +120,18 @@ def test_a_slow_arm_that_passes_the_targets_of_other_clients_is_not_blamed(secon
 def test_a_stop_that_comes_late_is_one_finding(mutant):
     failed = _failed("arm", MUTANTS["arm"][mutant])[0]
     assert failed & {"motion/stop", "motion/stop-lasts"} == {"motion/stop"}
+
+
+def test_noise_of_which_a_few_readings_at_rest_showed_little_sets_nothing_out():
+    motion, resting = msgspec.convert(tomllib.loads(MAP)["motion"], MotionMap), Resting({"pan": Noise(0.0, 0.0002)})
+    creeps = 0
+    for seed in range(100):
+        chance = random.Random(seed)  # noqa: S311 - no secret
+        moments = [(0.03 * number, chance.gauss(0, 0.003)) for number in range(60)]
+        assert not set_out([_reading(noise, moment) for moment, noise in moments], motion, resting)
+        seen = [_reading(noise + 0.2 * max(0, moment - 0.7), moment) for moment, noise in moments]
+        creeps += bool(set_out(seen, motion, resting))
+    assert creeps > 95
 
 
 def _reading(pan, sent=0.0):
