@@ -38,7 +38,7 @@ _MOVES_BY: Final = re.compile(r"relative|move_?by|nudge", re.IGNORECASE)
 _RELATIVE: Final = re.compile(r"relative|distance|delta|offset|step", re.IGNORECASE)
 _UNITS: Final = {
     "mm": r"_mm(?:_|$)|\b(?:mm|millimet)", "cm": r"_cm(?:_|$)|\b(?:cm|centimet)", "m": r"_m(?:_|$)|\bmet(?:re|er)s?\b",
-    "deg": r"_deg(?:rees)?(?:_|$)|\bdeg(?:rees?)?\b|°", "rad": r"_rad(?:_|$)|\brad(?:ians?)?\b",
+    "deg": r"_(?:deg(?:rees)?|°)(?:_|$)|\bdeg(?:rees?)?\b|°", "rad": r"_rad(?:_|$)|\brad(?:ians?)?\b",
 }  # fmt: skip
 # What the name of a way, a position or a velocity has beside the name of its axis.
 _BESIDE: Final = re.compile(
@@ -51,6 +51,22 @@ _OPPOSITES: Final = (
     ("forward", "backward"), ("forward", "back"), ("forwards", "backwards"), ("forward", "reverse"), ("ahead", "back"),
     ("up", "down"), ("left", "right"), ("in", "out"), ("ccw", "cw"), ("positive", "negative"), ("plus", "minus"),
 )  # fmt: skip
+# Limits in the words of a description: both of them, or the greatest, each with a unit. _DOUBTS: what may change them.
+_AMOUNT, _UNIT = r"([-+]?\d+(?:\.\d+)?)", r"((?:°|%|[a-z]+)(?:/s(?:ec)?|\s+per\s+second)?)?(?![\w.])"
+_RANGE: Final = re.compile(
+    rf"(?<![\w.]){_AMOUNT}\s*(?:[a-z/%°]+\s*)?(?:\bto\b|\.\.\.?|…)\s*{_AMOUNT}\s*{_UNIT}"
+    rf"|\bbetween\s+{_AMOUNT}\s*(?:[a-z/%°]+\s+)?and\s+{_AMOUNT}\s*{_UNIT}|\[\s*{_AMOUNT}\s*,\s*{_AMOUNT}\s*\]\s*{_UNIT}",
+    re.IGNORECASE,
+)
+_MOST: Final = re.compile(
+    r"\b(?:at most|not? more than|up to|maximum(?: of)?|max\.?|limited to|(?:not|never) exceed(?:s|ing)?)"
+    rf"\s*(?:±|\+/-)?\s*{_AMOUNT}\s*{_UNIT}",
+    re.IGNORECASE,
+)
+_DOUBTS: Final = re.compile(
+    r"\b(?:default|recommend|typical|usual|example|e\.g|unless|except|if|when|while|depend|about|approx|above|beyond|may)",
+    re.IGNORECASE,
+)
 #: How deep a schema is read.
 DEPTH: Final = 6
 # A list of names in a description, as "[left, right]"; a longer list is no body of a command.
@@ -92,8 +108,33 @@ class Commanded:
     @property
     def bounds(self) -> tuple[float, float] | None:
         """The least and the greatest value by the schema; None: it does not declare both."""
-        found = bounds_of(self.schema)
+        said = self._said
+        found = bounds_of(self.schema) or (said and (said[0], said[1]))
         return (-found[1], found[1]) if found and self.direction else found
+
+    @property
+    def source(self) -> str:
+        """Where its limits come from, in words; empty: it has none."""
+        if bounds_of(self.schema):
+            return "as declared"
+        return f'as its description says: "{self._said[2]}"' if self._said else ""
+
+    @property
+    def _said(self) -> tuple[float, float, str] | None:
+        """The limits in its description, and their words; None: it names none, several, or what may change them."""
+        text, least = str(self.schema.get("description", "")), _bound(self.schema, "minimum")
+        found = [(one[0], [part for part in one.groups("") if part]) for one in _RANGE.finditer(text)]
+        drives = self.direction or FAST.search(self.place) or _DRIVES.search(self.operation)
+        found += [
+            (one[0], [f"-{one[1]}" if least is None else str(least), one[1], *filter(None, [one[2]])])
+            for one in (_MOST.finditer(text) if drives or least is not None else ())
+        ]
+        if len(found) != 1 or _DOUBTS.search(text):
+            return None
+        words, (low, high, *units) = found[0]
+        said = [unit_of(f"_{re.split('[/ ]', unit)[0]}", {}) for unit in units if unit != "%"]
+        known = all(unit and unit_of(self.place, {}) in {"", unit} for unit in said)
+        return (float(low), float(high), words.strip()) if known and float(low) < float(high) else None
 
     @property
     def has_unit(self) -> bool:
@@ -313,10 +354,13 @@ def members_in(part: Schema) -> Iterator[tuple[str, Schema]]:
     first, length = part.get("prefixItems", ()), list_length(part)
     said = _WORDS.findall(str(part.get("description", "")))
     names = [str(name).lower() for name in (_item_names(part) or said)]
+    # Where a list's description has as many limits as items, they are those of the items in their order.
+    ranges, unit = [one[0] for one in _RANGE.finditer(str(part.get("description", "")))], unit_of("", part)
     for index in range(length):
         item = first[index] if index < len(first) else part.get("items")
         if isinstance(item, dict):
-            yield str(index), {**({"title": names[index]} if len(names) == length else {}), **item}
+            limits = {"description": f"{ranges[index]} {unit}"} if length == len(ranges) > 1 else {}
+            yield str(index), {**({"title": names[index]} if len(names) == length else {}), **limits, **item}
 
 
 def _item_names(part: Schema) -> list[str]:

@@ -25,6 +25,7 @@ from conformance.engine.commanded import (
     commanded_by,
     is_velocity,
     numbers_in,
+    parts_of,
     titles_in,
     with_query,
 )
@@ -78,6 +79,11 @@ _HELD: Final = re.compile(
     re.IGNORECASE | re.DOTALL,
 )
 _TIME: Final = re.compile(r"(\d+(?:\.\d+)?|\bone|\ba) ?(m(?:illi)?)?s(?:ec(?:ond)?s?)?\b", re.IGNORECASE)
+# _OTHERS: what another stop ends than a velocity.
+_OTHERS: Final = re.compile(
+    r"cancel|abort|mission|program|record|stream|daemon|server|scan|charg|navigat|goal|task|trajector|play",
+    re.IGNORECASE,
+)
 _REPLACES: Final = re.compile(
     r"\bnew (?:target|goal|move|position)\b[^.;]*\b(?:replace|supersede|preempt|displace|override)s\b", re.IGNORECASE
 )
@@ -131,7 +137,7 @@ class Plan:
         yield f"{self.drive.label} commands, by its description:"
         for command in self.numbers:
             bounds, tried = command.bounds, f"tried at {command.little:g}"
-            declared = f"{bounds[0]:g} to {bounds[1]:g}, as declared" if bounds else "no limits declared"
+            declared = f"{bounds[0]:g} to {bounds[1]:g}, {command.source}" if bounds else "no limits declared"
             if not (bounds or self.is_velocity):
                 tried += f", and up to {FARTHEST * command.little:g} where it is there at once"
             yield f"  {command.name:<16} {declared}; {tried}"
@@ -202,6 +208,8 @@ def plan_of(
     if not reads:
         raise NotPossibleError("the description has no GET with JSON that could show where the device is: give --read")
     stop, said = stop_beside(known, chosen), f"{text}. {named.text}"
+    if drives and stop and (stop.method == "DELETE" or _OTHERS.search(f"{stop.template} {stop.text}")):
+        stop = None
     return Plan(chosen, tuple(numbers), tuple(reads), drives, stop, named, preparing, bool(before), said)
 
 
@@ -427,6 +435,31 @@ class Finder(ABC):
         """Yield that values beyond the limits are refused, if the description declares that and the limits."""
         if declared and {"400", "422", "4XX", "4xx"} & self._plan.drive.responses.keys():
             yield 'beyond_limits = "refused"  # the description declares limits, and a response for invalid requests'
+
+    def _stop_call(self) -> tuple[str, Any] | None:
+        """Return call and body of the stop beside the operation, with templates; None: what it takes is not known."""
+        stop = self._plan.stop
+        if stop is None:
+            return None
+        # A message of SOAP has its usual values.
+        schema = body_schema(stop) if self._binding.syntax == "JSON" else None
+        wanted = [name for part in parts_of(schema) for name in part.get("required", ())]
+        told = self._answer if isinstance(self._answer, dict) else {}
+        ids = {name: name if name in told else "id" for name in NAME.findall(stop.template)}
+        if any(name not in told for name in (*wanted, *ids.values())):
+            self.notes.append(f"{stop.label} is not used: what it takes ({', '.join(wanted)}) is not known.")
+            return None
+        call = NAME.sub(lambda name: f"{{goto:/{ids[name[1]]}}}", stop.label)
+        return call, {name: f"{{goto:/{name}}}" for name in wanted} or None
+
+    def _stop_lines(self, rests_s: float, source: str) -> Iterator[str]:
+        """Yield the stop beside the operation that moves the device, if what it takes is known."""
+        if (found := self._stop_call()) is not None:
+            yield ""
+            yield "[motion.stop]"
+            yield f"send = {string(found[0])}"
+            yield from ([f"body = {inline(found[1])}"] if found[1] else [])
+            yield f"rests_within_s = {rests_s:.3g}  # {source}"
 
     def _turn_words(self, number: Commanded) -> Commanded:
         """Exchange the words for both directions of a number in the plan, and return it."""

@@ -218,13 +218,15 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
     yield "[motion.state.axes]  # limits and units: yours"
     for at, name in axes.items():
         number = goes.places.get(at) if goes else None
-        least, most = (number and not number.is_relative and number.bounds) or bounds_of(schemas[at]) or (-0.1, 0.1)
+        own_bounds = None if number is None or number.is_relative else number.bounds
+        least, most = own_bounds or bounds_of(schemas[at]) or (-0.1, 0.1)
         own = "" if goes else ", tolerance = 0.05"
         unit = basic_string(unit_of(at, schemas[at]))
         read = first.reads.get(at, first.state)
         own += "" if read is first.state else f", read = {basic_string(read.label)}"
         place = basic_string(at.rpartition("#")[2])
-        yield f"{key(name)} = {{ at = {place}, unit = {unit}, limits = [{least:g}, {most:g}]{own} }}"
+        source = f"  # limits: {number.source}" if number and own_bounds else ""
+        yield f"{key(name)} = {{ at = {place}, unit = {unit}, limits = [{least:g}, {most:g}]{own} }}{source}"
     if goes:
         yield ""
         yield "[motion.goto]"
@@ -232,7 +234,8 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
         if any(command.is_relative for command in goes.places.values()):
             yield "relative = true"
         yield "tolerance = 0.05"
-        yield from _stop(operations, goes.sent)
+    if first:
+        yield from _stop(operations, first.sent)
     if drives:
         yield ""
         yield "[motion.velocity]"
@@ -244,7 +247,8 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
         for at, one in drives.places.items():
             least, most = one.bounds or (-0.1, 0.1)
             where = f"of = {basic_string(axes[at])}" if at in axes else f"at = {basic_string(at)}"
-            yield f"{key(one.name)} = {{ limits = [{least:g}, {most:g}], {where} }}"
+            source = f"  # limits: {one.source}" if one.bounds else ""
+            yield f"{key(one.name)} = {{ limits = [{least:g}, {most:g}], {where} }}{source}"
 
 
 def why_no_map(operations: Sequence[Operation]) -> Iterator[str]:

@@ -15,7 +15,6 @@ from conformance.engine.commanded import (
     is_axis,
     member_name,
     numbers_in,
-    parts_of,
     unit_of,
 )
 from conformance.engine.driven_numbers import ANGLE
@@ -23,7 +22,6 @@ from conformance.engine.finding import AT_REST, FARTHEST, READY_S, Finder
 from conformance.engine.map_text import inline, key, string
 from conformance.measures.samples import SEVERAL, Noise, Sample, slope
 from conformance.scenarios.scenario import NotPossibleError
-from conformance.statement.motion_calls import NAME
 from conformance.transport.exchange import Exchange
 
 # _BEFORE_S: how long the device is watched before and after a small move. _MOVES_S: time for the move, s.
@@ -339,7 +337,8 @@ class PositionFinder(Finder):
             declared = self._limits(numbers[name])
             given |= ({"angle": angle} if angle else {}) | ({} if declared else {"bound": False})
             given |= {"speed": speed} if (speed := self._fastest(numbers[name])) else {}
-            source = "as declared" if declared else "none are declared; so far it was seen to go"
+            own_source = numbers[name].source if declared == numbers[name].bounds else "as declared"
+            source = own_source if declared else "none are declared; so far it was seen to go"
             if declared and limits[name] != declared:
                 given["accepts"], source = list(declared), "nearby, as the declared ones are far away"
             yield f"{key(name)} = {inline(given)}  # limits: {source}"
@@ -362,8 +361,10 @@ class PositionFinder(Finder):
             yield f"within_s = {2.0 + slowest * widest:.1f}  # seen: a part of the way took {slowest:.2f} s"
         off = max(max(2 * move.off, 8 * move.sigma) for move in moved.values())
         yield f"tolerance = {off + 0.01:.3g}  # twice what was seen, and room"
-        yield from self._refusal_lines(declared=all(map(self._limits, numbers.values())))
-        yield from self._stop_lines()
+        # Of limits in words nobody knows whether what is beyond them is refused.
+        by_schema = all(self._limits(one) and (bounds_of(one.schema) or not one.bounds) for one in numbers.values())
+        yield from self._refusal_lines(declared=by_schema)
+        yield from self._stop_lines(1.0, "the suite's")
 
     def _fastest(self, number: Commanded) -> float:
         """Return the greatest speed of a move that is declared in the unit of its axis; 0: none is."""
@@ -393,23 +394,3 @@ class PositionFinder(Finder):
         near = self._limits(number) or tuple(value for _, value in self._samples(number.name, 0.0))
         said = unit_of(self._places[number.name][1], self._schemas[number.name]) or unit_of(number.place, number.schema)
         return said or ("rad" if number.turns and max(map(abs, near)) < _RAD else "")
-
-    def _stop_lines(self) -> Iterator[str]:
-        """Yield the stop beside the operation that moves the device, if its parameters are known."""
-        stop = self._plan.stop
-        if stop is None:
-            return
-        # A message of SOAP has its usual values.
-        schema = body_schema(stop) if self._binding.syntax == "JSON" else None
-        wanted = [name for part in parts_of(schema) for name in part.get("required", ())]
-        told = self._answer if isinstance(self._answer, dict) else {}
-        ids = {name: name if name in told else "id" for name in NAME.findall(stop.template)}
-        if any(name not in told for name in (*wanted, *ids.values())):
-            self.notes.append(f"{stop.label} is not used: what it takes ({', '.join(wanted)}) is not known.")
-            return
-        yield ""
-        yield "[motion.stop]"
-        yield f"send = {string(NAME.sub(lambda name: f'{{goto:/{ids[name[1]]}}}', stop.label))}"
-        if wanted:
-            yield f"body = {inline({name: f'{{goto:/{name}}}' for name in wanted})}"
-        yield "rests_within_s = 1.0  # the suite's"

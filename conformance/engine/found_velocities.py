@@ -40,6 +40,8 @@ _NEAR: Final = 2.0
 # _FULL: share of its velocity with which a device has not begun to stop. _LATE_S: how much later than it began to move
 # it may begin to stop, s.
 _FULL, _LATE_S = 0.8, 0.15
+# Share of the hold time after which a device that was stopped must not drive on any more.
+_STILL_HELD: Final = 0.8
 # How long a device that was stopped is awaited, s.
 _STOPS_S: Final = 4.0
 # _OTHER: rates that differ by more than this factor have different units. _ROOM_RAD: greatest turn.
@@ -61,9 +63,15 @@ class VelocityFinder(Finder):
             numbers = {command.name: command for command in self._plan.numbers}
             hold_s = self._hold_s(numbers[name], place, response)
             settle_s = max(self._settle_s, *(self._rises_s(numbers[name], *seen) for name, seen in shown.items()))
+            stops_s = self._stops_s(numbers[name], place, response)
         finally:
             self._command({})
         self.lines = list(self._lines(responses, shown, settle_s, hold_s))
+        if stops_s is not None:
+            # A stop that takes as long as the end of the hold time stops nothing.
+            most_s = 2.0 if hold_s is None else min(2.0, _STILL_HELD * hold_s)
+            rests_s = max(min(settle_s, 2.0) + _LATE_S, min(1.5 * stops_s + _LATE_S, most_s))
+            self.lines += self._stop_lines(rests_s, "seen: how long it took to rest, and half as long again")
 
     def _drive(self, number: Commanded, speed: float, *, end: bool = True) -> tuple[float, float]:
         """Drive at a velocity and end it; return when it had begun, and when the last command was answered.
@@ -340,6 +348,25 @@ class VelocityFinder(Finder):
         self.notes.append(f"Let go, it drove on for all of the {self._clock.now() - last:.1f} s of the watch.")
         return None
 
+    def _stops_s(self, number: Commanded, place: str, response: Response) -> float | None:
+        """Drive, and send the stop; return how long the device took to rest, s. None: it accepts none for a drive."""
+        found = self._stop_call()
+        if found is None:
+            return None
+        self._watch(_BEFORE_S)
+        speed = self._first[number.name]
+        self._drive(number, speed, end=False)
+        exchange = self._send(*found)
+        ended = self._clock.now()
+        self._watch(_STOPS_S / 2)
+        samples = self._looks.samples(self._reads[0].label, place, ended)
+        since = self._still_since(samples, response, response.ratio * speed)
+        self._command({})
+        if not self._took(exchange):
+            self.notes.append(f"{found[0]} is not used: while the device drove, it got {exchange.came}.")
+            return None
+        return _STOPS_S if since is None else since - ended
+
     def _rises_s(self, number: Commanded, place: str, response: Response) -> float:
         """Drive at the limit, back to where it came from; return how long it may take to reach that velocity, s.
 
@@ -436,7 +463,7 @@ class VelocityFinder(Finder):
         else:
             yield f"hold_s = {_DEMANDED_S:g}  # the suite's: let go, it drove on"
             yield "# If the robot by design holds a velocity until it is told otherwise, take out the line above."
-        yield from self._refusal_lines(declared=all(numbers[name].bounds for name in shown))
+        yield from self._refusal_lines(declared=all(bounds_of(numbers[name].schema) for name in shown))
         yield ""
         yield "[motion.velocity.axes]"
         for name, (place, response) in shown.items():
@@ -450,7 +477,7 @@ class VelocityFinder(Finder):
             given["tolerance"] = round(
                 max(off[name] * widest[name], 8 * (0 if response.is_position else response.sigma)), 4
             )
-            source = "limits as declared" if number.bounds else "limits: the suite's, as none are declared"
+            source = f"limits {number.source}" if number.bounds else "limits: the suite's, as none are declared"
             yield f"{key(name)} = {inline(given)}  # {source}; changed by {response.ratio:.3g} at velocity 1"
 
     def _turns_with(self, responses: Mapping[tuple[str, str], Response]) -> bool:

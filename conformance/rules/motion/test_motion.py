@@ -8,11 +8,13 @@ from collections.abc import Iterator
 
 from conformance.measures.samples import SEVERAL
 from conformance.rules.motion.judging import ALL, at, halts, in_words, judge_goal, legs_of, moved_axis, off, usable
+from conformance.rules.motion.test_velocities import judge_ends
 from conformance.scenarios.motion.measuring import speed_in
 from conformance.scenarios.motion.moves import many_commands, new_targets, repeated, stops, targets
 from conformance.scenarios.motion.resting import crept, fastest, set_out
 from conformance.scenarios.motion.several import several_clients, several_drivers
 from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading, middle_of
+from conformance.scenarios.motion.velocities import velocities
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.evidence import Case
@@ -106,12 +108,15 @@ def speed(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
         )
 
 
-@rule("motion/stop", on=(stops,))
-def stop_rests(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
+@rule("motion/stop", on=(stops, velocities))
+def stop_rests(trace: tuple[Leg, ...] | tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a stop under way stops the device in time, before its target."""
     if motion.stop is None:
         yield _NO_STOP
-    for leg, readings, unusable in halts(trace, motion):
+    else:
+        drives = [drive for drive in trace if isinstance(drive, Drive)]
+        yield from judge_ends(drives, motion.stop.rests_within_s, "the stop", motion)
+    for leg, readings, unusable in halts(tuple(leg for leg in trace if isinstance(leg, Leg)), motion):
         if unusable is not None:
             yield unusable
             continue

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from conformance.measures.samples import SEVERAL, longest_s
 from conformance.rules.motion.judging import at, follows, is_each_late, must_rest_from, off, slowest, tries_of, went_on
@@ -42,18 +42,25 @@ def _at_rest(readings: list[Reading], drive: Drive, motion: MotionMap) -> str | 
 @rule("motion/velocity-stop", on=(velocities,))
 def stopped(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether velocity 0 brings the device to rest in time."""
-    if motion.velocity is None:
-        return
+    if motion.velocity is not None:
+        yield from judge_ends(trace, motion.velocity.settle_s, "velocity 0", motion)
+
+
+def judge_ends(trace: Sequence[Drive], settle_s: float, what: str, motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether the command that ends a drive brings the device to rest in time: "velocity 0", or "the stop"."""
     for tries in tries_of(trace):
-        ended = [(drive, drive.end) for drive in tries if drive.end is not None]
+        ends = [(drive, drive.end) for drive in tries if drive.end is not None]
+        ended = [(drive, end) for drive, end in ends if bool(end.targets) == (what == "velocity 0")]
         excused = not is_each_late([(end, drive.readings) for drive, end in ended])
         for drive, end in ended:
-            yield from _judge_end(drive, end, motion.velocity.settle_s, motion, excused=excused)
+            yield from _judge_end(drive, end, settle_s, what, motion, excused=excused)
 
 
-def _judge_end(drive: Drive, end: Command, settle_s: float, motion: MotionMap, *, excused: bool) -> Iterator[Outcome]:
+def _judge_end(
+    drive: Drive, end: Command, settle_s: float, what: str, motion: MotionMap, *, excused: bool
+) -> Iterator[Outcome]:
     if not end.is_ok:
-        yield Case(holds=False, exchange=end.exchange, expected=f"a 2xx for velocity 0 after {drive.name}")
+        yield Case(holds=False, exchange=end.exchange, expected=f"a 2xx for {what} after {drive.name}")
         return
     due = must_rest_from(end, drive.readings, excused=excused) + settle_s
     moved = _at_rest([reading for reading in drive.after if reading.sent >= due], drive, motion)
@@ -61,7 +68,7 @@ def _judge_end(drive: Drive, end: Command, settle_s: float, motion: MotionMap, *
         axes = motion.velocity.axes if motion.velocity else {}
         speeds = {axes[name].of: speed * axes[name].scale for name, speed in drive.wanted.items() if axes[name].of}
         moved = went_on(end, drive.readings, speeds, settle_s, motion) or moved
-    yield from _rests(moved, drive, f"rest {settle_s:g} s after velocity 0 ({drive.name})")
+    yield from _rests(moved, drive, f"rest {settle_s:g} s after {what} ({drive.name})")
 
 
 def _rests(moved: str | None, drive: Drive, expected: str) -> Iterator[Outcome]:

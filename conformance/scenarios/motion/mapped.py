@@ -38,8 +38,8 @@ _PACE_S: Final = 0.02
 _STOP_S: Final = 2.0
 # How long, and how often, a move is sent again while the device finishes the one before, s.
 _FINISHES_S, _AGAIN_S = 1.0, 0.05
-# _QUEUE_S: how long a device gets for moves one after the other, s. _NEXT_S: so long it rests between two at most, s.
-_QUEUE_S, _NEXT_S = 20.0, 0.5
+# How long a device gets for moves one after the other, s.
+_QUEUE_S: Final = 20.0
 # _LINK_S: how long responses are watched, s. _SLOWER: times that a later one may be slower than those.
 _LINK_S, _SLOWER = 2.0, 3.0
 # How long a device without positions gets to come to rest, s.
@@ -125,11 +125,7 @@ class MappedDevice:
         return self.moves.seconds if "seconds" in names_in([self.moves.send, self.moves.body]) else 0.0
 
     def read(self, *, at_once: bool = False) -> Reading:
-        """Read the state, and the state of the last accepted move; unless ``at_once``, a while after the last reading.
-
-        Raises:
-            NoAnswerError: there is no response.
-        """
+        """Read the state, and that of the last accepted move; unless ``at_once``, a while after the last reading."""
         state = self.motion.state
         if not at_once:
             self.clock.sleep(self._read_at + _PACE_S - self.clock.now())
@@ -154,20 +150,12 @@ class MappedDevice:
         )
 
     def get(self, call: str) -> tuple[Exchange, Any]:
-        """Send a reading operation of the map; return the exchange and its value, or None.
-
-        Raises:
-            NoAnswerError: there is no response.
-        """
+        """Send a reading operation of the map; return the exchange and its value, or None."""
         exchange = self.send(self.binding.make(call, None))
         return exchange, self.binding.content(exchange.response.body)
 
     def send(self, made: Outgoing, **how: Any) -> Exchange:
-        """Send a request; ``how``: arguments of HttpClient.send().
-
-        Raises:
-            NoAnswerError: there is no response.
-        """
+        """Send a request; ``how``: arguments of HttpClient.send()."""
         self.ready.keep()
         exchange = self._exchange(made, **how)
         if self.ready.lost_lease(exchange):
@@ -226,11 +214,7 @@ class MappedDevice:
         return Command(sent, self.clock.now(), targets, exchange, self.has_failed(exchange))
 
     def goto(self, targets: Mapping[str, float], ends: Mapping[str, float] | None = None) -> Command:
-        """Send a move; ``ends``: where it must end, if not at the targets.
-
-        Raises:
-            NoAnswerError: there is no response.
-        """
+        """Send a move; ``ends``: where it must end, if not at the targets."""
         axes, wanted = self.motion.state.axes, {**self.home, **(ends or targets)}
         wanted = {name: axes[name].near(one, self._last.get(name, one)) for name, one in wanted.items()}
         self.room.note_command({"a move"})
@@ -256,9 +240,6 @@ class MappedDevice:
             integers: write whole numbers without a fraction.
             authorized: send the credentials.
             fresh: send it on a connection that is closed afterwards.
-
-        Raises:
-            NoAnswerError: there is no response.
         """
         written = {**dict.fromkeys(self.drives.axes, 0.0), **speeds}
         # A text that must be refused is no commanded velocity.
@@ -284,11 +265,7 @@ class MappedDevice:
         self._answer = self.binding.content(exchange.response.body) or self._answer
 
     def stop(self) -> Command | None:
-        """Send the stop, or velocity 0; return None if the map has neither, or names an unknown value.
-
-        Raises:
-            NoAnswerError: there is no response.
-        """
+        """Send the stop, or velocity 0; return None if the map has neither, or names an unknown value."""
         stop = self.motion.stop
         if stop is None:
             return self.drive({}) if self.motion.velocity else None
@@ -299,16 +276,14 @@ class MappedDevice:
         return self._send(made, {}, timeout_s=max(_STOP_S, stop.rests_within_s))
 
     def halt(self) -> Command | None:
-        """Send the stop; if the device refuses it, send velocity 0 too: a stop for a move may be refused without one.
+        """Send the stop, and velocity 0 too if the device refuses the stop, or takes velocities alone.
 
         Returns:
             The stop; None: there is none that can be sent.
-
-        Raises:
-            NoAnswerError: there is no response.
         """
         command = self.stop()
-        if command is not None and command.is_refused and self.motion.stop and self.motion.velocity:
+        is_enough = self.motion.goto is not None and command is not None and not command.is_refused
+        if command is not None and self.motion.stop and self.motion.velocity and not is_enough:
             self.drive({})
         return command
 
@@ -346,7 +321,6 @@ class MappedDevice:
 
         Raises:
             NotPossibleError: it cannot be read. A device that nobody sees is not moved.
-            NoAnswerError: there is no response.
         """
         seen = [self.read() for _ in range(SEVERAL if self.motion.state.axes else 0)]
         if not all(reading.values for reading in seen):
@@ -389,18 +363,15 @@ class MappedDevice:
         last = (accepted or list(commands))[-1]
         seen, due = self.follow(last, others) if accepted else [], self.due(last)
         if len(accepted) > 1 and self.moves.while_moving is None:
-            most_s = min(len(accepted) * self.takes_s, _QUEUE_S)
-            seen += self.watch(max(self.clock.now(), last.answered + most_s) + 2 * _NEXT_S, self._has_rested)
+            begun = max(self.clock.now(), last.answered + self.takes_s)
+            seen += self.watch(
+                begun + min(len(accepted) * self.takes_s, _QUEUE_S),
+                lambda so_far: so_far[-1].sent > begun and self.saw_rest(so_far),
+            )
             due = max(due, seen[-SEVERAL:][0].sent)
-            if not self._has_rested(seen):
+            if not self.rests:
                 raise NotSeenError(f"it still moves {seen[-1].sent - last.answered:.1f} s after the last of its moves")
         return seen, due
-
-    def _has_rested(self, readings: Sequence[Reading]) -> bool:
-        """Return whether the last readings show rest for so long that no further move follows."""
-        last = [reading for reading in readings if reading.sent >= readings[-1].sent - _NEXT_S]
-        stays = all(self.is_near(reading.values, last[0].values) for reading in last)
-        return len(last) < len(readings) and stays and self.saw_rest(last)
 
     def due(self, command: Command) -> float:
         """Return when the target of a command must have been reached, s of the clock."""
@@ -420,7 +391,6 @@ class MappedDevice:
 
         Raises:
             NotPossibleError: it does not get there.
-            NoAnswerError: there is no response.
         """
         if self.motion.goto is None:
             self.come_to_rest()
@@ -474,7 +444,6 @@ class MappedDevice:
 
         Raises:
             NotPossibleError: it does not.
-            NoAnswerError: there is no response.
         """
         if stop:
             self.halt()

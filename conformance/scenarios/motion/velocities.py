@@ -80,11 +80,19 @@ def velocities(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Drive, .
             Part(_speeds_text(speeds, by := _in_turn(mapped, speeds, number)), speeds, longer=longer, by=by)
             for number, (speeds, longer) in enumerate(_plan_drives(mapped, quick=True), run.seed)
         ]
-        return record_parts(_in_a_row(mapped, parts))
+        return record_parts(itertools.chain(_in_a_row(mapped, parts), _stopped(mapped, parts[:1])))
     parts = [Part(_speeds_text(speeds), speeds, longer=longer) for speeds, longer in _plan_drives(mapped, quick=False)]
     parts += [Part(_speeds_text(speeds, by), speeds, by=by) for speeds, by in _by_each_way(mapped)]
     pairs = (parts[index : index + _PAIR] for index in range(0, len(parts), _PAIR))
-    return record_parts(drive for pair in pairs for drive in _in_a_row(mapped, pair))
+    in_pairs = (drive for pair in pairs for drive in _in_a_row(mapped, pair))
+    return record_parts(itertools.chain(in_pairs, _stopped(mapped, parts[:_PAIR])))
+
+
+def _stopped(mapped: MappedDevice, parts: Sequence[Part]) -> Iterator[Drive]:
+    """Drive at velocities again, and end each by the stop, of a device that takes velocities alone."""
+    if mapped.motion.stop is not None and mapped.motion.goto is None:
+        for part in parts:
+            yield from _in_a_row(mapped, [replace(part, what=f"{part.what}, to be stopped", is_stopped=True)])
 
 
 def _by(way: Way, speeds: Position) -> _By:
@@ -238,6 +246,7 @@ class Part:
         ends: what the device must take instead; None: the same.
         longer: whether it is to outlast the hold time.
         by: in which ways it is commanded in turn; empty: as usual.
+        is_stopped: whether the stop ends it, in place of velocity 0.
     """
 
     what: str
@@ -245,6 +254,7 @@ class Part:
     ends: Position | None = None
     longer: bool = False
     by: _By = ()
+    is_stopped: bool = False
 
 
 def _in_a_row(mapped: MappedDevice, parts: Sequence[Part]) -> Iterator[Drive]:
@@ -275,7 +285,7 @@ def _at_each(mapped: MappedDevice, parts: Sequence[Part]) -> Iterator[tuple[Part
         lasts_s = max(settle_s + STEADY_S, outlasts_s + MEASURED_S)
         made = part.speeds
         if before is not None and not _goes_on(mapped, before[1], made, lasts_s + drives.settle_s):
-            yield before[0], _end_drive(mapped, before[1], before[0].by), before[2]
+            yield before[0], _end_drive(mapped, before[1], before[0]), before[2]
             before, settle_s = None, drives.settle_s
         if before is None:
             made = with_room(mapped, [part.speeds], lasts_s + drives.settle_s)[0]
@@ -288,7 +298,7 @@ def _at_each(mapped: MappedDevice, parts: Sequence[Part]) -> Iterator[tuple[Part
             yield before
         before = part, drive, whole
     if before is not None:
-        yield before[0], _end_drive(mapped, before[1], before[0].by), before[2]
+        yield before[0], _end_drive(mapped, before[1], before[0]), before[2]
 
 
 def _times(mapped: MappedDevice, before: Position, after: Position) -> float:
@@ -494,10 +504,20 @@ def _kept_up(
     return replace(drive, resting=mapped.resting, since=since), whole
 
 
-def _end_drive(mapped: MappedDevice, drive: Drive, by: _By) -> Drive:
-    """End a drive by velocity 0; return it with the readings after that."""
-    end = mapped.drive({}, way=by[0] if by else None, integers=True)
-    return _watch_rest(mapped, replace(drive, end=end), [], end.answered + mapped.drives.settle_s)
+def _end_drive(mapped: MappedDevice, drive: Drive, part: Part) -> Drive:
+    """End a drive by velocity 0, or by the stop; return it with the readings after that."""
+    stop = mapped.motion.stop if part.is_stopped else None
+    end = mapped.stop() if stop else None
+    end = end or mapped.drive({}, way=part.by[0] if part.by else None, integers=True)
+    rests_s = stop.rests_within_s if stop else mapped.drives.settle_s
+    drive = _watch_rest(mapped, replace(drive, end=end), [], end.answered + rests_s)
+    if stop and mapped.rests:
+        # It must not take its velocity up again.
+        is_over = partial(mapped.room.is_over, [drive.wanted], rests_s=rests_s)
+        drive = replace(drive, after=(*drive.after, *mapped.watch(mapped.clock.now() + _SLOWS_S, is_over)))
+    if stop:
+        mapped.come_to_rest()
+    return drive
 
 
 def _watch_rest(

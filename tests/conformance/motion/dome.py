@@ -67,7 +67,10 @@ rests_within_s = 0.3
 RELATIVE = (
     MAP.replace("AbsoluteMove", "RelativeMove")
     .replace("Position = {", "Translation = {")
-    .replace('beyond_limits = "refused"\n\n[motion.velocity]', "relative = true\n\n[motion.velocity]")
+    .replace(
+        'beyond_limits = "refused"\nwhile_moving = "displaces"\n\n[motion.velocity]',
+        "relative = true\n\n[motion.velocity]",
+    )
 )
 _DATA = Path(__file__).parent / "data"
 _WSDL, _TYPES = ((_DATA / name).read_text(encoding="utf-8") for name in ("ptz.wsdl", "onvif.xsd"))

@@ -23,9 +23,10 @@ from winch import Winch
 
 from conformance.api.call_rules import CallRules
 from conformance.documents.openapi import read_operations
-from conformance.engine.commanded import commanded_by, lasting, titles_in, with_query
+from conformance.engine.commanded import Commanded, commanded_by, lasting, titles_in, with_query
 from conformance.engine.driven_numbers import Looks, numbers_of
 from conformance.engine.finding import plan_of
+from conformance.engine.first_described import proposed_map
 from conformance.engine.found_positions import PositionFinder
 from conformance.engine.found_velocities import VelocityFinder
 from conformance.engine.map_text import template_of
@@ -270,6 +271,51 @@ class Backward(Rover):
         return status, dict(zip("xy", said["pose"], strict=True)) if path == "/pose" else said
 
 
+class Holding(Body):
+    """A rover that holds a velocity for two seconds."""
+
+    def drive(self, speeds, hold_s, now):
+        super().drive(speeds, 5 * hold_s, now)
+
+
+class Stopping(Rover):
+    """A rover with a stop beside its velocities."""
+
+    DESCRIPTION = rover.DESCRIPTION | {
+        "paths": {**rover.DESCRIPTION["paths"], "/stop": {"post": {"summary": "Stop driving.", "responses": {}}}}
+    }
+
+    def answer(self, method, path, octets):
+        return self.stop() if path == "/stop" else super().answer(method, path, octets)
+
+    def stop(self):
+        self.body.halt(self.body.now())
+        return 200, {}
+
+
+class IgnoringStop(Stopping):
+    """A rover that answers its stop and drives on."""
+
+    def stop(self):
+        return 200, {}
+
+
+class Resuming(Stopping):
+    """A rover that drives on a second after it was stopped."""
+
+    def stop(self):
+        speeds = dict(self.body.speeds)
+        self.body.later.append((self.body.now() + 1.0, lambda due: self.body.drive(speeds, 0.6, due)))
+        return super().stop()
+
+
+class StoppingGoals(Stopping):
+    """A rover whose stop is for its goals alone."""
+
+    def stop(self):
+        return 409, {"detail": "no goal is active"}
+
+
 def _simulated(body_type, noise=0.0, rule=stopped, scenario=velocities, text="", device=Rover):
     """Return the map that is found of a simulated rover, and the failures of a rule, first that on its stops."""
     clock = SimulatedClock()
@@ -304,6 +350,21 @@ def test_how_long_a_rover_holds_a_velocity_is_found_though_it_drives_the_wrong_w
     motion, failures = _simulated(Body, rule=velocity, device=Backward)
     assert motion.velocity.hold_s == pytest.approx(rover.HOLD_S, abs=0.1)
     assert len(failures) > 2, "it is driven back to where there is room, and drives on"
+
+
+@pytest.mark.parametrize(("device", "is_blamed"), [(Stopping, False), (IgnoringStop, True), (Resuming, True)])
+def test_a_stop_beside_velocities_is_found_and_has_to_stop_the_rover(device, is_blamed):
+    motion, failures = _simulated(Holding, rule=stop_rests, device=device)
+    assert motion.stop.send == "POST /stop"
+    assert bool(failures) == is_blamed, failures
+
+
+def test_a_stop_that_is_for_something_else_is_none_of_velocities():
+    assert _simulated(Body, device=StoppingGoals)[0].stop is None
+    paths = copy.deepcopy(Stopping.DESCRIPTION["paths"])
+    paths["/stop"]["post"]["summary"] = "Stop the mission."
+    operations = read_operations({**Stopping.DESCRIPTION, "paths": paths})
+    assert plan_of(operations, "PUT /velocity", None, CallRules()).stop is None
 
 
 @pytest.mark.parametrize("rule", [stopped, velocity])
@@ -460,6 +521,42 @@ def test_words_of_a_description_say_how_long_a_velocity_holds_and_what_a_second_
     operations = read_operations(rover.DESCRIPTION)
     plan = plan_of(operations, "PUT /velocity", None, CallRules(), text=text)
     assert (plan.holds_s, plan.replaces) == (holds_s, replaces)
+
+
+@pytest.mark.parametrize(
+    ("place", "schema", "bounds", "words"),
+    [
+        ("/linear", {"description": "m/s, at most 0.5 m/s"}, (-0.5, 0.5), "at most 0.5 m/s"),
+        ("/speed", {"minimum": 0, "description": "up to 0.8"}, (0.0, 0.8), "up to 0.8"),
+        ("/x", {"description": "between -1 and 1.5 m"}, (-1.0, 1.5), "between -1 and 1.5 m"),
+        ("/yaw", {"description": "heading in [-3.1, 3.1] rad"}, (-3.1, 3.1), "[-3.1, 3.1] rad"),
+        ("/yaw", {"description": "-90 to 90 degrees"}, (-90.0, 90.0), "-90 to 90 degrees"),
+        ("/v", {"minimum": -1, "maximum": 1, "description": "at most 0.5 m/s"}, (-1.0, 1.0), ""),
+        ("/speed", {"description": "0.3 m/s by default, at most 0.5 m/s"}, None, ""),
+        ("/speed", {"description": "at most 0.5 m/s, at most 0.2 m/s indoors"}, None, ""),
+        ("/speed", {"description": "held for at most 2 s"}, None, ""),
+        ("/speed_mm", {"description": "at most 0.5 m/s"}, None, ""),
+        ("/speed", {"description": "at most 0.5 m/s when docked"}, None, ""),
+        ("/speed", {"description": "see chapter 2.1"}, None, ""),
+    ],
+)
+def test_limits_in_words_are_those_of_an_unequivocal_sentence(place, schema, bounds, words):
+    number = Commanded("it", place, {"type": "number", **schema}, turns=False, operation="/drive")
+    assert (number.bounds, words in number.source) == (bounds, True)
+    assert bool(number.source) == bool(bounds)
+
+
+def test_limits_in_words_of_a_list_are_those_of_its_items_and_stand_in_the_map():
+    said = "rad: base -2.6 to 2.6, shoulder -1.0 to 1.8"
+    joints = {"type": "array", "minItems": 2, "maxItems": 2, "items": _NUMBER, "description": said}
+    body = {"type": "object", "properties": {"joints": joints}}
+    move = {"put": {"requestBody": {"content": {"application/json": {"schema": body}}}, "responses": {}}}
+    seen = {"type": "object", "properties": {"joints": {**joints, "description": ""}}}
+    read = {"get": {"responses": {"200": {"content": {"application/json": {"schema": seen}}}}}}
+    operations = read_operations({"openapi": "3.1.0", "info": {}, "paths": {"/target": move, "/joints": read}})
+    assert [one.bounds for one in commanded_by(operations[0])] == [(-2.6, 2.6), (-1.0, 1.8)]
+    lines = "\n".join(proposed_map(operations))
+    assert 'limits = [-1, 1.8] }  # limits: as its description says: "-1.0 to 1.8 rad"' in lines
 
 
 class LateWatchdog(Body):
