@@ -108,7 +108,7 @@ class Commanded:
     @property
     def bounds(self) -> tuple[float, float] | None:
         """The least and the greatest value by the schema; None: it does not declare both."""
-        said = self._said
+        said = self._in_words
         found = bounds_of(self.schema) or (said and (said[0], said[1]))
         return (-found[1], found[1]) if found and self.direction else found
 
@@ -117,10 +117,10 @@ class Commanded:
         """Where its limits come from, in words; empty: it has none."""
         if bounds_of(self.schema):
             return "as declared"
-        return f'as its description says: "{self._said[2]}"' if self._said else ""
+        return f'as its description says: "{self._in_words[2]}"' if self._in_words else ""
 
     @property
-    def _said(self) -> tuple[float, float, str] | None:
+    def _in_words(self) -> tuple[float, float, str] | None:
         """The limits in its description, and their words; None: it names none, several, or what may change them."""
         text, least = str(self.schema.get("description", "")), _bound(self.schema, "minimum")
         found = [(one[0], [part for part in one.groups("") if part]) for one in _RANGE.finditer(text)]

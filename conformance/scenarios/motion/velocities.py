@@ -80,15 +80,15 @@ def velocities(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Drive, .
             Part(_speeds_text(speeds, by := _in_turn(mapped, speeds, number)), speeds, longer=longer, by=by)
             for number, (speeds, longer) in enumerate(_plan_drives(mapped, quick=True), run.seed)
         ]
-        return record_parts(itertools.chain(_in_a_row(mapped, parts), _stopped(mapped, parts[:1])))
+        return record_parts(itertools.chain(_in_a_row(mapped, parts), _ended_by_stop(mapped, parts[:1])))
     parts = [Part(_speeds_text(speeds), speeds, longer=longer) for speeds, longer in _plan_drives(mapped, quick=False)]
     parts += [Part(_speeds_text(speeds, by), speeds, by=by) for speeds, by in _by_each_way(mapped)]
     pairs = (parts[index : index + _PAIR] for index in range(0, len(parts), _PAIR))
     in_pairs = (drive for pair in pairs for drive in _in_a_row(mapped, pair))
-    return record_parts(itertools.chain(in_pairs, _stopped(mapped, parts[:_PAIR])))
+    return record_parts(itertools.chain(in_pairs, _ended_by_stop(mapped, parts[:_PAIR])))
 
 
-def _stopped(mapped: MappedDevice, parts: Sequence[Part]) -> Iterator[Drive]:
+def _ended_by_stop(mapped: MappedDevice, parts: Sequence[Part]) -> Iterator[Drive]:
     """Drive at velocities again, and end each by the stop, of a device that takes velocities alone."""
     if mapped.motion.stop is not None and mapped.motion.goto is None:
         for part in parts:
