@@ -136,8 +136,7 @@ class Goto(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         within_s: time to reach any target, where no template has "{seconds}".
         settle_s: time beyond either, s.
         beyond_limits: what the device does with a target beyond its limits: "refused", "clamped", or "undefined".
-        while_moving: what it does with a second move: it "displaces" the first, or is "refused"; None: nobody says it,
-            and the device may make one move after the other, or several at once.
+        while_moving: what a second move does: it "displaces" the first, or is "refused"; None: nobody says it.
     """
 
     send: Call
