@@ -122,17 +122,13 @@ class Difference:
         changed = list(_changes(self.old, self.new))
         if not changed:
             return (
-                "Suite, statement, motion map, description, effort and the operations called are the same in both "
-                "runs. A changed verdict comes from the device, or from a fault that does not show in every run."
+                "Suite, statement, motion map, description, classes, effort and the operations called are the same in "
+                "both runs. A changed verdict comes from the device, or from a fault that does not show in every run."
             )
-        device = [one for one in changed if one.startswith("the device")]
-        others = [one for one in changed if one not in device]
+        others = [item for item in changed if not item.startswith("the device")]
         told = f"Changed between the runs: {', '.join(changed)}."
-        if not others:
-            return told
-        return (
-            f"{told} A changed verdict may come from {'these' if len(others) > 1 else 'this'}, and not from the device."
-        )
+        these = "these" if len(others) > 1 else "this"
+        return f"{told} A changed verdict may come from {these}, and not from the device." if others else told
 
     @property
     def regressions(self) -> tuple[Change, ...]:
@@ -244,6 +240,11 @@ def _changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
             if "none" in {before, now}:
                 versions = ["none" if each == "none" else "given" for each in (before, now)]
             yield name + (f" ({' → '.join(versions)})" if len(set(versions)) > 1 else "")
+    judged = [{name for name, found in item["classes"].items() if found != "not-claimed"} for item in (old, new)]
+    if judged[0] != judged[1]:
+        yield f"the classes judged ({' → '.join(', '.join(sorted(each)) for each in judged)})"
+    if old.get("selected") != new.get("selected"):
+        yield "the requirements selected"
     called = [{each["operation"] for each in _operations(item) if each["called"]} for item in (old, new)]
     if called[0] != called[1]:
         yield f"the operations called ({len(called[0])} → {len(called[1])})"

@@ -17,11 +17,11 @@ _NAME_SHOWN = 200
 
 def headline(found: Difference) -> str:
     """Return a summary of the changes in one sentence, such as "1 regression: 1 new failure, 2 fixed."."""
-    counts = [
-        f"{len(changes)} {kind.removesuffix('s') if len(changes) == 1 else kind}"
-        for kind, changes in found.groups.items()
-        if kind in _TONES
-    ]
+    counts = []
+    for kind, changes in found.groups.items():
+        beside = sum(not change.regression for change in changes) if kind is Kind.LOST else 0
+        more = f" ({beside} of them no regression)" if beside else ""
+        counts += [f"{len(changes)} {kind.removesuffix('s') if len(changes) == 1 else kind}{more}"] * (kind in _TONES)
     still = [f"{n} {words}" for n, words in zip(found.still, ("still failing", "still warned of"), strict=True) if n]
     summary = ", ".join([*counts, *still]) or "no requirement changed its verdict"
     number = len(found.regressions)

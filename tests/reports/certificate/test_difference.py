@@ -138,20 +138,19 @@ def test_what_is_beside_the_verdict_is_shown_and_no_regression(pair):
     assert not difference(old, {**new, "web_server": lost}).regressions
 
 
-SAME = "Suite, statement, motion map, description, effort and the operations called are the same in both runs."
+SAME = "Suite, statement, motion map, description, classes, effort and the operations called are the same in both runs."
 
 
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
         ({}, SAME),
-        (
-            {"suite": {"version": "9.9", "contract": "1.2", "digest": "sha256:x"}},
-            "Changed between the runs: the suite (",
-        ),
+        ({"suite": {"version": "9.9", "contract": "1.2", "digest": "x"}}, "Changed between the runs: the suite ("),
         ({"digests": {"statement": "sha256:y", "map": "sha256:1"}}, "Changed between the runs: the statement. "),
         ({"digests": {"statement": "sha256:x", "map": "sha256:2"}}, "Changed between the runs: the motion map. "),
         ({"effort": "deep"}, "Changed between the runs: the effort ("),
+        ({"classes": {"http": "pass"}}, "Changed between the runs: the classes judged ("),
+        ({"selected": ["http/date"]}, "Changed between the runs: the requirements selected. "),
         (
             {"api": {"operations": [{"operation": "GET /x", "called": True}]}},
             "Changed between the runs: the operations",
