@@ -6,8 +6,7 @@ import json
 from collections.abc import Iterator
 
 from conformance.rules.ros_gateway.judging import fails_as, statuses
-from conformance.scenarios.ros.parameters import Case as Of
-from conformance.scenarios.ros.parameters import Got, Parameters, Put, is_same, node_parameters
+from conformance.scenarios.ros.parameters import Got, Parameters, Put, Reaction, is_same, node_parameters
 from conformance.scenarios.ros.web import differences, document_of, is_out_of_range, is_success
 from conformance.scenarios.rule import Outcome, rule
 from conformance.statement.ros_map import RosMap
@@ -21,7 +20,7 @@ def exact(trace: Parameters, ros: RosMap) -> Iterator[Outcome]:
         if got.value:
             yield _judge_read(got, trace, ros)
     for put in trace.puts:
-        if put.case is Of.TAKES:
+        if put.reaction is Reaction.TAKES:
             yield from _judge_set(put)
 
 
@@ -54,16 +53,16 @@ def refusals(trace: Parameters) -> Iterator[Outcome]:
     """Judge whether a value that the node refuses, or does not get, is told as a failure, and changes nothing."""
     for got in trace.gets:
         if not got.value:
-            yield _failure(got, f"{got.body.parameter} of {got.body.node}, {Of.MISSING}")
+            yield _failure(got, f"{got.body.parameter} of {got.body.node}, {Reaction.MISSING}")
     for put in trace.puts:
-        if put.case is not Of.TAKES:
-            yield _failure(put, f"{put.body.parameter} of {put.body.node}, {put.case}")
+        if put.reaction is not Reaction.TAKES:
+            yield _failure(put, f"{put.body.parameter} of {put.body.node}, {put.reaction}")
             changed = "" if put.before == put.after else f"{put.after} in place of {put.before}"
             yield Case(not changed, put.exchange, "the parameter as it was before", changed, f"{put.operation} kept")
 
 
 def _failure(one: Got | Put, what: str) -> Case:
     body = one.body
-    declared = body.refused if isinstance(one, Put) and one.case is Of.REFUSES else ()
+    declared = body.refused if isinstance(one, Put) and one.reaction is Reaction.REFUSES else ()
     holds = fails_as(one.exchange, body, declared)
     return Case(holds, one.exchange, f"{statuses(declared)} for {what}", cause=f"{one.operation} {what}")

@@ -30,7 +30,7 @@ _SAMPLES: Final = {"quick": 6, "standard": 12, "deep": 30}
 _MORE_S: Final = 0.15
 
 
-class Case(StrEnum):
+class Reaction(StrEnum):
     """What a node does with a request to set its parameter."""
 
     TAKES = "which the node takes"
@@ -65,7 +65,7 @@ class Put:
     Attributes:
         operation: the operation.
         body: its map.
-        case: what the node does.
+        reaction: what the node does.
         value: JSON of what was sent, as a message with one field; empty: it is no value of the type.
         exchange: request and response.
         heard: JSON of what the node was asked to set, each as such a message.
@@ -74,7 +74,7 @@ class Put:
 
     operation: str
     body: Parameter
-    case: Case
+    reaction: Reaction
     value: str
     exchange: Exchange
     heard: tuple[str, ...]
@@ -144,19 +144,19 @@ class _End:
         first, *values = self.values(most)
         self.hold(first)
         until = WALL_CLOCK.now() + 2 * self.body.within_s + PATIENCE_S
-        while not is_success((put := self.put(Case.TAKES, first)).exchange, self.body) and WALL_CLOCK.now() < until:
+        while not is_success((put := self.put(Reaction.TAKES, first)).exchange, self.body) and WALL_CLOCK.now() < until:
             self.maker.is_gentle |= is_out_of_range(put.exchange, self.body)
             first = self.maker.usual().value
             WALL_CLOCK.sleep(PACE_S)
         yield put
-        yield from (self.put(Case.TAKES, value) for value in values)
+        yield from (self.put(Reaction.TAKES, value) for value in values)
         made = self.request(self.maker.usual().value)
         if self.gateway.binding.syntax == "JSON" and self.maker.has_numbers:
-            yield self.put(Case.OTHER_TYPE, None, self.with_text(made))
+            yield self.put(Reaction.OTHER_TYPE, None, self.with_text(made))
         self.hold(self.maker.usual().value, refuses=True)
-        yield self.put(Case.REFUSES, self.maker.usual().value)
+        yield self.put(Reaction.REFUSES, self.maker.usual().value)
         self.gateway.robot.tell("forget", name=self.body.node)
-        yield self.put(Case.MISSING, self.maker.usual().value)
+        yield self.put(Reaction.MISSING, self.maker.usual().value)
 
     def values(self, most: int) -> Iterator[dict[str, Any]]:
         """Yield values of the parameter's type, extreme ones among them."""
@@ -190,20 +190,20 @@ class _End:
                 return Got(self.call, self.body, text, exchange, is_shown)
             WALL_CLOCK.sleep(PACE_S)
 
-    def put(self, case: Case, value: dict[str, Any] | None, made: Outgoing | None = None) -> Put:
+    def put(self, reaction: Reaction, value: dict[str, Any] | None, made: Outgoing | None = None) -> Put:
         """Send a request to set the parameter."""
-        robot, node, before = self.gateway.robot, self.body.node, self.value_at_node(case)
+        robot, node, before = self.gateway.robot, self.body.node, self.value_at_node(reaction)
         robot.take_heard(node)
         exchange = self.gateway.send(made or self.request(value), self.body.response_s)
         count = int(is_success(exchange, self.body)) + 1
         heard = robot.take_heard(node, count, _MORE_S)
         values = tuple(json.dumps({"value": each.content.get(self.body.parameter)}) for each in heard)
         text = "" if value is None else json.dumps(value)
-        return Put(self.call, self.body, case, text, exchange, values, before, self.value_at_node(case))
+        return Put(self.call, self.body, reaction, text, exchange, values, before, self.value_at_node(reaction))
 
-    def value_at_node(self, case: Case) -> str:
+    def value_at_node(self, reaction: Reaction) -> str:
         """Return JSON of what the node has."""
-        if case is Case.MISSING:
+        if reaction is Reaction.MISSING:
             return ""
         held = self.gateway.robot.tell("held", node=self.body.node)["values"]
         return json.dumps({"value": held[self.body.parameter]})
