@@ -386,7 +386,7 @@ class _Goals:
         ends: is set when the node ends.
     """
 
-    def __init__(self, note: Callable[[str, Any], None], kind: str, steps: _Steps, ends: threading.Event) -> None:
+    def __init__(self, note: Callable[..., None], kind: str, steps: _Steps, ends: threading.Event) -> None:
         self._note, self._kind, self._steps, self._ends = note, kind, steps, ends
         self._accepted: deque[dict[str, Any]] = deque()
         self._by_goal: dict[bytes, dict[str, Any]] = {}
@@ -426,8 +426,10 @@ class _Goals:
         end = "canceled" if goal.is_cancel_requested else step.get("end", "succeed")
         if end == "canceled":
             self._ends.wait(step.get("cancel_s", 0.0))
+        # Dated before anybody can know of it.
+        at_ns = time.monotonic_ns()
         {"canceled": goal.canceled, "abort": goal.abort}.get(end, goal.succeed)()
-        self._note("end", {"id": id_.hex(), "end": end})
+        self._note("end", {"id": id_.hex(), "end": end}, at_ns)
         return message_of(f"{self._kind}#Result", step.get("result", {}))
 
     def _is_over(self, goal: Any, wait_s: float) -> bool:

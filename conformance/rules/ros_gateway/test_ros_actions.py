@@ -98,12 +98,17 @@ def _end_of(one: Goal) -> float | None:
 
 
 def _steady(one: Goal) -> Iterator[Outcome]:
-    end = _end_of(one)
-    early = [look for look in one.looks if end is not None and look.received < end and is_end(one.body, look.word)]
+    end, state = _end_of(one), one.body.state
+    # A cancellation that the server has accepted is as good as its end.
+    taken = min((heard.at for heard in one.heard if heard.what == "cancel" and heard.content["accepted"]), default=end)
+    ends = dict.fromkeys(state.canceled if state else (), taken)
+    looks = [(look, ends.get(look.word, end)) for look in one.looks if is_end(one.body, look.word)]
+    early = [(look, due) for look, due in looks if due is not None and look.received < due]
     if early:
-        found = f"{early[0].word!r} {(end or 0.0) - early[0].received:.2f} s before it"
-        yield Case(False, early[0].exchange, f"no end before that of a goal {one.course}", found, "early")
-    ended = [look for look in one.looks if is_end(one.body, look.word)]
+        look, due = early[0]
+        found = f"{look.word!r} {due - look.received:.2f} s before it"
+        yield Case(False, look.exchange, f"no end before that of a goal {one.course}", found, "early")
+    ended = [look for look, _ in looks]
     left = next((late for first, late in pairwise(ended) if late.word != first.word), None)
     if ended:
         found = f"{ended[0].word!r}, then {left.word!r}" if left else ""

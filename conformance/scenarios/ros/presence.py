@@ -125,7 +125,7 @@ def publishers_end(gateway: Gateway) -> Publishers:
     presences += topics.publish_all("a publisher after one of another type")
     absences += topics.let_age("whose publisher was killed", gateway.kill)
     presences += topics.publish_all("a publisher in place of one that was killed")
-    topics.leave()
+    topics.end()
     return Publishers(tuple(absences), tuple(presences))
 
 
@@ -137,31 +137,32 @@ def publishers_of_each_quality(gateway: Gateway) -> tuple[Presence, ...]:
     topics = _Topics(gateway)
     found = [*topics.publish_all("a best-effort publisher", reliability="best_effort")]
     topics.leave()
-    found += topics.publish_all("a latched publisher", repeat_s=0.0, durability="transient_local")
-    topics.leave()
+    # The last message of a latched publisher stays; where one may be too old, it does not.
+    aged = {body.topic for _, body in gateway.of(Reads) if body.max_age_s is not None}
+    lasting = _Topics(gateway, lambda body: body.topic not in aged)
+    # It is older than its discovery.
+    found += lasting.publish_all("a latched publisher", repeat_s=0.0, apart=True, durability="transient_local")
+    lasting.end()
     return tuple(found)
 
 
 class _Topics:
-    """All topics that are read, each with messages of its own."""
+    """Topics that are read, all or those that are ``wanted``, each with messages of its own."""
 
-    def __init__(self, gateway: Gateway) -> None:
+    def __init__(self, gateway: Gateway, wanted: Callable[[Reads], bool] = lambda _: True) -> None:
         self._gateway = gateway
-        self._reads = dict(gateway.of(Reads))
+        self._reads = {call: body for call, body in gateway.of(Reads) if wanted(body)}
         self._definitions = {call: gateway.definition(body.type) for call, body in self._reads.items()}
 
-    def publish_all(self, publisher: str, repeat_s: float = _REPEAT_S, **quality: str) -> Iterator[Presence]:
+    def publish_all(self, publisher: str, repeat_s: float = _REPEAT_S, **how: Any) -> Iterator[Presence]:
         """Publish on all topics, and yield the gateway's response for each."""
         before = {call: content_of(self._gateway.read(call, body), body) for call, body in self._reads.items()}
         values: dict[str, Any] = {}
-        aged = {body.topic for body in self._reads.values() if body.max_age_s is not None}
         for body in self._reads.values():
             if body.topic not in values:
                 value = values[body.topic] = self._message(body.type)
-                # A message that comes once is older than its discovery, unless it would be too old by then.
-                apart = not (repeat_s or body.topic in aged)
-                self._gateway.robot.publish(body.topic, body.type, value, repeat_s=repeat_s, apart=apart, **quality)
-        until = WALL_CLOCK.now() + max(body.within_s for body in self._reads.values()) + PATIENCE_S
+                self._gateway.robot.publish(body.topic, body.type, value, repeat_s=repeat_s, **how)
+        until = WALL_CLOCK.now() + max((body.within_s for body in self._reads.values()), default=0.0) + PATIENCE_S
         found: dict[str, Presence] = {}
         for turn in itertools.count(1):
             # In rounds, so that no message gets too old while another is awaited. Several rounds, because a gateway
@@ -203,9 +204,13 @@ class _Topics:
 
     def leave(self) -> None:
         """Leave all topics, for long enough that a gateway which looks at the graph now and then notices."""
+        self.end()
+        WALL_CLOCK.sleep(_LATE_S)
+
+    def end(self) -> None:
+        """Leave all topics."""
         for body in self._reads.values():
             self._gateway.robot.tell("forget", name=body.topic)
-        WALL_CLOCK.sleep(_LATE_S)
 
     def change_type(self) -> None:
         """Publish messages of another type on all topics for a while, and leave."""
@@ -320,7 +325,7 @@ def graph_grows(gateway: Gateway, effort: Effort) -> Grown:
         robot.publish(name, lists[0][1].of or _KINDS["topics"] if lists else _KINDS["topics"])
     lacking = tuple(_read_until_listed(gateway, call, one, names, there=True) for call, one in lists)
     presences = tuple(topics.publish_all(f"a publisher beside {len(names)} new topics"))
-    topics.leave()
+    topics.end()
     for name in sorted(names):
         robot.tell("forget", name=name)
     left = tuple(_read_until_listed(gateway, call, one, names, there=False) for call, one in lists)

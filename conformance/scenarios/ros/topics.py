@@ -6,7 +6,7 @@ Times are s of the monotonic clock, which all processes of a machine share.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -24,6 +24,7 @@ from conformance.scenarios.ros.web import (
     document_of,
     equal,
     fields_in,
+    is_finite,
     is_out_of_range,
     is_success,
     with_texts,
@@ -131,8 +132,12 @@ class _Reader:
     def publish_samples(self, effort: Effort) -> Iterator[Shown]:
         """Publish messages, and yield the gateway's response for each."""
         lost = 0
-        samples = self.gateway.maker(self.definition).samples(_SAMPLES[effort.name], large=_LARGE[effort.name])
-        for sample in samples:
+        # An operation on a topic that another one has read is sent fewer.
+        most = _SAMPLES["quick" if self.older else effort.name]
+        for sample in self.gateway.maker(self.definition).samples(most, large=_LARGE[effort.name]):
+            if sample.kind is Kind.NON_FINITE and is_finite(fields_in(sample.value, self.reads)):
+                # The operation does not show that field.
+                continue
             shown = self.of(sample)
             yield shown
             waited_s = 0.0 if shown.was_shown else shown.sent - shown.published
@@ -328,13 +333,13 @@ class _Writer:
         accepted = is_success(exchange, self.body)
         return Sent(self.call, self.body.publishes, what, value, exchange, accepted, client)
 
-    def hear(self, count: int) -> tuple[Heard, ...]:
+    def hear(self, count: int, more_s: float) -> tuple[Heard, ...]:
         """Return the messages of this many accepted requests, and those of a moment after."""
         robot, topic = self.gateway.robot, self.body.publishes
         heard = robot.take_heard(topic, count, self.body.within_s)
         while len(heard) < count and (more := robot.take_heard(topic, 1, self.body.within_s)):
             heard += more
-        return (*heard, *robot.take_heard(topic, 1, _MORE_S))
+        return (*heard, *robot.take_heard(topic, 1, more_s))
 
     def one_by_one(self, effort: Effort) -> Iterator[Burst]:
         """Yield each message with its outcome."""
@@ -371,7 +376,8 @@ class _Writer:
         robot, ends = self.gateway.robot, (self.body.publishes, "publishers")
         before = robot.count(*ends)
         for _ in range(times):
-            yield self.burst(1, _BURST, f"{_BURST} messages in a row")
+            # What comes later than that counts in the next burst as well.
+            yield self.burst(1, _BURST, f"{_BURST} messages in a row", more_s=0.0)
             crowded = self.burst(MOST_CLIENTS, 1, f"messages of {MOST_CLIENTS} clients at once")
             # A publisher that leaves late leaves all the same.
             until = WALL_CLOCK.now() + self.body.within_s
@@ -382,7 +388,7 @@ class _Writer:
             # A publisher with ROS's usual depth of 10 may lose some of so many.
             yield replace(self.burst(CROWD, _OF_EACH, f"messages of {CROWD} clients at once"), reliable=False)
 
-    def burst(self, clients: int, each: int, how: str) -> Burst:
+    def burst(self, clients: int, each: int, how: str, more_s: float = _MORE_S) -> Burst:
         """Return the outcome of messages of clients that send at the same moment, each one after another."""
         samples = [[self.maker.usual() for _ in range(each)] for _ in range(clients)]
         made = [[(sample, json.dumps(self.value(sample)), self.request(sample)) for sample in own] for own in samples]
@@ -393,14 +399,15 @@ class _Writer:
             for attempt, (one, value, _) in zip(attempts, made[client], strict=True)
             if isinstance(attempt, Exchange)
         )
-        heard = self.hear(sum(message.accepted for message in sent))
+        heard = self.hear(sum(message.accepted for message in sent), more_s)
         return Burst(self.call, how, sent, heard, self.reliable)
 
     def send_malformed(self) -> Iterator[Burst]:
         """Yield requests that a gateway is likely to refuse, with their outcome."""
         if self.body.in_url and not self.body.fields:
-            for name in self.body.in_url:
-                yield from self.malformed_as(f"a text as {name}", self.with_text(name), is_wrong=self.is_number(name))
+            texts = {f"a text as {name}": self.with_text(name) for name in self.body.in_url}
+            numbers = {what for what, name in zip(texts, self.body.in_url, strict=True) if self.is_number(name)}
+            yield from self.malformed(texts, numbers)
             yield self.late()
             return
         right = self.request(self.maker.usual())
@@ -415,8 +422,7 @@ class _Writer:
             # A gateway may make a text of anything; a number of a text it may not.
             (is_wrong if is_whole and self.maker.has_numbers else wrong)[_TEXTS] = with_texts(right.body, self.body)
         every = {what: replace(right, body=body) for what, body in (wrong | is_wrong).items()}
-        for what, made in every.items():
-            yield from self.malformed_as(what, made, is_wrong=what in is_wrong)
+        yield from self.malformed(every, is_wrong)
         # A gateway refuses in several places, and each may change what becomes of the next message.
         for what, made in every.items():
             self.send_made(what, "", made)
@@ -436,6 +442,19 @@ class _Writer:
         """Return whether the field that a parameter gives is a number or a boolean."""
         shape = self.definition.at(self.body.in_url[name])
         return shape is not None and not shape.is_text
+
+    def malformed(self, every: Mapping[str, Outgoing], is_wrong: Collection[str]) -> Iterator[Burst]:
+        """Yield invalid requests with their outcome; one by one only if something comes, to see of which."""
+        for _ in range(2):
+            sent = [replace(self.send_made(what, "", made), is_wrong=what in is_wrong) for what, made in every.items()]
+            if not self.gateway.robot.take_heard(self.body.publishes, 1, _MORE_S):
+                yield from (Burst(self.call, one.what, (one,), (), self.reliable) for one in sent)
+                return
+            # It may be the word of a watchdog.
+            if not self.is_silent():
+                return
+        for what, made in every.items():
+            yield from self.malformed_as(what, made, is_wrong=what in is_wrong)
 
     def malformed_as(self, what: str, made: Outgoing, *, is_wrong: bool) -> Iterator[Burst]:
         """Yield an invalid request with its outcome, apart from messages that the gateway publishes by itself."""

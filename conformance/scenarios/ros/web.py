@@ -141,6 +141,13 @@ def fields_in(message: dict[str, Any], body: Body) -> dict[str, Any]:
     return found if body.places else message
 
 
+def is_finite(value: Any) -> bool:
+    """Return whether no number in a message is NaN or an infinity."""
+    if isinstance(value, dict | list):
+        return all(map(is_finite, value.values() if isinstance(value, dict) else value))
+    return not isinstance(value, float) or math.isfinite(value)
+
+
 def with_texts(octets: bytes, body: Body) -> bytes:
     """Return a JSON body whose message has a text in place of each number, and an object in place of each text."""
 
