@@ -20,7 +20,7 @@ from conformance.scenarios.ros.topics import (
     topic_writes,
 )
 from conformance.scenarios.ros.web import Difference, changes, differences, document_of, equal, fields_in, is_success
-from conformance.scenarios.rule import Note, NotTested, Outcome, rule
+from conformance.scenarios.rule import NotClaimed, Note, NotTested, Outcome, rule
 from conformance.statement.ros_map import Publishes, Reads, RosMap
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
@@ -214,6 +214,8 @@ def order(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
 @rule("ros-gateway/refused-nothing", on=(topic_refusals, topic_writes))
 def refused_nothing(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether a refused request publishes nothing."""
+    if all(message.accepted for burst in trace for message in burst.sent):
+        yield NotClaimed("the gateway refused no request")
     for burst in trace:
         for message in burst.sent:
             if message.accepted:
