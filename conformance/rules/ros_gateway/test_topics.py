@@ -150,7 +150,7 @@ def write_exact(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
                 message.exchange,
                 f"{message.what} on {message.topic} as the web sent it" + (f": {web}" if found else ""),
                 observed=f"on {message.topic}: {own}",
-                cause=f"{message.operation} {found[0].at if found else ''}",
+                cause=message.operation,
             )
 
 
