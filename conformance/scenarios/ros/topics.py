@@ -407,7 +407,7 @@ class _Writer:
         if self.body.in_url and not self.body.fields:
             texts = {f"a text as {name}": self.with_text(name) for name in self.body.in_url}
             numbers = {what for what, name in zip(texts, self.body.in_url, strict=True) if self.is_number(name)}
-            yield from self.malformed(texts, numbers)
+            yield from self.send_invalid(texts, numbers)
             yield self.late()
             return
         right = self.request(self.maker.usual())
@@ -422,7 +422,7 @@ class _Writer:
             # A gateway may make a text of anything; a number of a text it may not.
             (is_wrong if is_whole and self.maker.has_numbers else wrong)[_TEXTS] = with_texts(right.body, self.body)
         every = {what: replace(right, body=body) for what, body in (wrong | is_wrong).items()}
-        yield from self.malformed(every, is_wrong)
+        yield from self.send_invalid(every, is_wrong)
         # A gateway refuses in several places, and each may change what becomes of the next message.
         for what, made in every.items():
             self.send_made(what, "", made)
@@ -443,7 +443,7 @@ class _Writer:
         shape = self.definition.at(self.body.in_url[name])
         return shape is not None and not shape.is_text
 
-    def malformed(self, every: Mapping[str, Outgoing], is_wrong: Collection[str]) -> Iterator[Burst]:
+    def send_invalid(self, every: Mapping[str, Outgoing], is_wrong: Collection[str]) -> Iterator[Burst]:
         """Yield invalid requests with their outcome; one by one only if something comes, to see of which."""
         for _ in range(2):
             sent = [replace(self.send_made(what, "", made), is_wrong=what in is_wrong) for what, made in every.items()]
