@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from conformance.api.rest.listing import COUNTS, TOTALS, Listing, Page, listing_of, members_of, number_of, page_of
@@ -242,21 +242,27 @@ class Totals:
 
 # Phrases in a description of a sum, and of things that a write leaves as they are.
 _SUM: Final = re.compile(r"\b(?:sum|total) of (?:all |the |their )*(\w+)", re.IGNORECASE)
+_COUNTED: Final = re.compile(r"\b(?:how many|number of)\b", re.IGNORECASE)
 _STAY: Final = re.compile(
     r"\b(?:stays?|remains?|(?:is|are) (?:kept|unchanged|untouched|not (?:changed|touched)))\b", re.IGNORECASE
 )
 
 
-def numbers_of(above: Operation, lister: Operation) -> dict[str, str]:
+def numbers_of(above: Operation, lister: Operation, *, is_beside: bool = False) -> dict[str, str]:
     """Return the numbers of a thing that a list below it tells too: how many items it has, or the sum of a member.
 
-    By the number's name: the member that is added up; empty for the number of items.
+    By the number's name: the member that is added up; empty for the number of items. Of a thing beside the list, only
+    those that are the number of all its items.
     """
     things, listing = lister.template.rstrip("/").rpartition("/")[2].lower(), listing_of(lister)
     thing, found = singular(things), dict[str, str]()
     counts = {f"{thing}count", f"{things}count", f"numberof{things}", f"num{things}", f"total{things}"}
     for name, part in parts_of(above.shape).items() if listing is not None else ():
         said = str(flat(part).get("description", "")).lower()
+        if is_beside:
+            of_all = re.fullmatch(rf"(?:the )?(?:how many|number of)(?: the| all)? {re.escape(things)}\W*", said)
+            found |= {name: ""} if of_all else {}
+            continue
         added = _SUM.search(said) if re.search(rf"\b{things}\b", said) and kinds_of(part) <= {"integer"} else None
         words = (
             [word for word in (added[1], singular(added[1])) if word in listing.members] if added and listing else []
@@ -264,6 +270,15 @@ def numbers_of(above: Operation, lister: Operation) -> dict[str, str]:
         if words or plain_name(name) in counts or re.search(rf"\b(?:how many|number of)(?: the)? {things}\b", said):
             found[name] = next(iter(words), "")
     return found
+
+
+def counters_of(operations: Iterable[Operation]) -> dict[str, tuple[Operation, dict[str, str]]]:
+    """Return, by the path of a list, the read of a thing such as `/stats` that tells how many items it has."""
+    reads = [one for one in operations if one.method == "GET" and not one.parameter("path")]
+    things = [one for one in reads if listing_of(one) is None and _COUNTED.search(str(one.shape))]
+    pairs = [(lister.template.rstrip("/"), one, lister) for lister in reads if listing_of(lister) for one in things]
+    found = [(path, one, numbers_of(one, lister, is_beside=True)) for path, one, lister in pairs]
+    return {path: (one, numbers) for path, one, numbers in found if numbers}
 
 
 def numbers_by_items(numbers: dict[str, str], thing: dict[str, Any], items: Sequence[Any]) -> dict[str, float]:
@@ -287,6 +302,11 @@ class Sublists:
             path: numbers_of(one, reads[path]) for path, one in below.items() if collection_of(one.template)
         }
         self._above = {path.rpartition("/")[0] for path, numbers in self._numbers.items() if numbers}
+        # By path of a list: the path of a thing beside it that tells how many items it has.
+        counters = counters_of(operations)
+        self._beside = {path: one.template.rstrip("/") for path, (one, _) in counters.items()}
+        self._numbers |= {path: numbers for path, (_, numbers) in counters.items()}
+        self._above |= {*self._beside.values()}
         # By path: the path template and the page of a list, and what a thing shows, since the last change.
         self._lists: dict[str, tuple[str, Page]] = {}
         self._things: dict[str, dict[str, Any]] = {}
@@ -313,16 +333,19 @@ class Sublists:
             yield from self._list(occasion, operation, path, page)
         elif template in self._above and is_json(answer.media_type):
             self._things[path] = occasion.members(parts_of(operation.shape))
-        for key in [key for key in self._lists if path in {key, key.rpartition("/")[0]}]:
-            (template, page), thing = self._lists[key], self._things.get(key.rpartition("/")[0], {})
+        for key, (template, page) in self._lists.items():
+            there = self._beside.get(key, key.rpartition("/")[0])
+            thing = self._things.get(there, {}) if path in {key, there} else {}
+            doubt = "it may count only now and then" if key in self._beside else ""
             for name, number in numbers_by_items(self._numbers[template], thing, page.items).items():
                 # It may be late after a change.
                 holds, is_late = thing[name] == number, occasion.sent_s - self._changed_s <= SETTLES_S
                 self._right |= {(template, name)} if holds else set()
                 is_known = self._numbers[template][name] or (template, name) in self._right
-                expected = f"{number} as {name}, by the items of the list below it"
+                expected = f"{number} as {name}, by the items of {key}"
                 if holds or (is_known and not is_late):
-                    yield _case(occasion, name, f"{thing[name]} as {name}", expected, holds=holds)
+                    case = _case(occasion, name, f"{thing[name]} as {name}", expected, holds=holds)
+                    yield replace(case, doubt=doubt)
 
     def _list(self, occasion: Occasion, operation: Operation, path: str, page: Page) -> Iterator[Case]:
         """Take a list, and judge whether it has the items that it had before the thing above it was written."""
@@ -333,7 +356,10 @@ class Sublists:
             cause, found = f"{operation.label} stay", f"{len(page.items)} items, without {''.join(lost[:1])}"
             yield occasion.case("description/written-is-read", not lost, expected, found, cause=cause)
         most = listing.most({}) if listing is not None else 0
-        if not page.goes_on and (not most or len(page.items) < most):
+        count, is_beside = len(page.items), path in self._beside
+        # A server may cut a list at a round number.
+        is_cut = is_beside and count >= min(_FEWEST_CUT) and count % _CUTS[0] == 0
+        if not (page.goes_on or is_cut) and (not most or count < most):
             self._lists[path] = operation.template.rstrip("/"), page
 
 

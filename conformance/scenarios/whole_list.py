@@ -13,7 +13,7 @@ from urllib.parse import quote
 from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.listing import Page, cursors, listing_of, page_of
 from conformance.api.rest.things import below_others, collection_of, id_member, identifier_of
-from conformance.checkers.totals import numbers_by_items, numbers_of
+from conformance.checkers.totals import counters_of, numbers_by_items, numbers_of
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
@@ -61,15 +61,7 @@ def chooses(lister: Operation) -> bool:
 def read_whole(
     writer: Writer, lister: Operation, item: Operation, path: str, always: Mapping[str, Any] = MappingProxyType({})
 ) -> WholeList:
-    """Read a list by a bounded number of pages.
-
-    Args:
-        writer: sends the requests.
-        lister: the operation that lists.
-        item: the operation that reads one of the items.
-        path: that of the collection.
-        always: values of query parameters that each request has.
-    """
+    """Read a list by a bounded number of pages."""
     exchange, found, is_whole = writer.send(lister, path, query=always), list[Any](), False
     for number in range(1, _PAGES + 1):
         page = page_of(exchange.response, lister)
@@ -114,11 +106,14 @@ def _seems_cut(lister: Operation, page: Page, sent: Mapping[str, Any]) -> bool:
 
 
 def read_numbers(writer: Writer, lister: Operation | None, path: str) -> None:
-    """Read a list and the thing above it until the numbers that both tell agree, or the time for that is over."""
+    """Read a list and the thing above or beside it until the numbers in both agree, or the time for that is over."""
     template = lister.template.rstrip("/") if lister is not None else ""
     known, path = callable_operations(writer.api), path.rstrip("/")
     above = known.get(("GET", template.rpartition("/")[0]))
     numbers = numbers_of(above, lister) if above is not None and lister is not None else {}
+    there = path.rpartition("/")[0]
+    if template in (counters := counters_of(known.values())):
+        there, numbers = counters[template][0].template, counters[template][1]
 
     def agree(found: list[Exchange]) -> bool:
         page, now = page_of(found[0].response, lister), members(found[1], numbers)
@@ -126,7 +121,7 @@ def read_numbers(writer: Writer, lister: Operation | None, path: str) -> None:
         return all(now[name] == number for name, number in right.items())
 
     if numbers:
-        requests = [Outgoing("GET", there) for there in (path, path.rpartition("/")[0])]
+        requests = [Outgoing("GET", one) for one in (path, there)]
         writer.until(lambda: [writer.api.send(request) for request in requests], agree)
 
 

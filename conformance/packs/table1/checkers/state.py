@@ -68,14 +68,7 @@ class _Samples:
 
 
 class State:
-    """Judges the plain GETs of the state in all exchanges of one run.
-
-    Args:
-        url: returns the URL of a path.
-        limits: the robot's limits.
-        clock: takes the odometry's stamps.
-        credentials: of the client.
-    """
+    """Judges the plain GETs of the state in all exchanges of one run."""
 
     def __init__(self, url: Callable[[str], str], limits: Limits, clock: Clock, credentials: Credentials) -> None:
         self._limits, self._clock, self._credentials = limits, clock, credentials

@@ -44,13 +44,7 @@ class NoObserverError(Exception):
 
 
 class ListObserver:
-    """The robot's own list.
-
-    Args:
-        rest: where it is.
-        slow_s: how long the robot usually takes.
-        clock: by which it is read.
-    """
+    """The robot's own list."""
 
     exact = False
 

@@ -373,13 +373,7 @@ class _Player:
         return None
 
     def _send_during(self, sent: list[Refused], active: dict[str, Any], pose: Pose) -> Exchange | None:
-        """Send requests during a goal, and read the goal; return None if the goal ended by itself or was lost.
-
-        Args:
-            sent: those others, and at last the request.
-            active: the goal.
-            pose: its pose.
-        """
+        """Send requests during a goal, and read the goal; return None if the goal ended by itself or was lost."""
         robot, one = self.robot, sent[-1]
         exchange = self._send(one)
         goal, _ = robot.goal()

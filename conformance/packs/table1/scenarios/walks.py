@@ -130,11 +130,7 @@ def room_for(limits: Limits) -> float:
 
 
 class VelocityMachine(RuleBasedStateMachine):
-    """Sends velocities, linear parts, stops, invalid velocities and renewals in random order.
-
-    Args:
-        walk: state shared by all walks of one check.
-    """
+    """Sends velocities, linear parts, stops, invalid velocities and renewals in random order."""
 
     def __init__(self, walk: Walk) -> None:
         super().__init__()
