@@ -587,7 +587,8 @@ def state_member(read: Operation) -> str:
     named = (
         name for name, one in parts.items() if plain_name(name) in _STATE_NAMES and len(flat(one).get("enum", ())) > 1
     )
-    return next(named, "")
+    # A mode is the state of what has no other one.
+    return min(named, key=lambda name: plain_name(name) == "mode", default="")
 
 
 def _word(state: str) -> re.Pattern[str]:

@@ -245,10 +245,11 @@ class _Thing:
     def _singly(self, change: Operation, bodies: list[Any], *, whole_last: bool) -> list[Any]:
         """Return bodies of several writes: each member alone, and all together, which restores them.
 
-        All are written a second time in the other order, because a write must leave the others as they are.
+        A PATCH writes all twice, in either order: it must leave the others as they are. A PUT writes all, and then few.
         """
-        singles, now = bodies[:-1][:_SINGLES] if change.method == "PATCH" else [], self._members()
-        old = [{name: now[name] for name in singles[0] if name in now}] if len(singles) > 1 else []
+        is_patch, now = change.method == "PATCH", self._members()
+        singles = bodies[:-1][:_SINGLES] if is_patch else bodies[-3:-1]
+        old = [{name: now[name] for name in singles[0] if name in now}] if is_patch and len(singles) > 1 else []
         again = [*old, *(reversed(singles) if old else ())]
         return [*bodies[:-1], *again, *bodies[-1:]] if whole_last else [*bodies[-1:], *singles, *again]
 

@@ -5,7 +5,7 @@ import json
 import pytest
 from small_device import REFUSED, answers, contract_of, described
 
-from conformance.checkers.changes import barred_by
+from conformance.checkers.changes import barred_by, state_member
 from conformance.checkers.rest import RestCheckers
 from conformance.documents.openapi import read_operations
 from conformance.transport.exchange import Exchange, Request, Response
@@ -172,3 +172,12 @@ def test_states_that_the_description_of_a_409_excludes(says, barred):
     }
     found = {one.label: one for one in read_operations(described(paths, "3.1.0"))}
     assert barred_by(found["POST /missions/{id}/start"], found["GET /missions/{id}"]).get("status", set()) == barred
+
+
+@pytest.mark.parametrize(
+    ("names", "member"), [(("mode", "state"), "state"), (("mode", "gear"), "mode"), (("gear",), "")]
+)
+def test_a_mode_is_the_state_of_what_has_no_other_one(names, member):
+    shape = {"type": "object", "properties": {name: {"enum": ["a", "b"]} for name in names}}
+    reads = read_operations(described({"/belts/{id}": {"get": {"responses": {"200": answers(shape)}}}}, "3.1.0"))
+    assert [state_member(read) for read in reads] == [member]
