@@ -363,10 +363,10 @@ class MappedDevice:
         last = (accepted or list(commands))[-1]
         seen, due = self.follow(last, others) if accepted else [], self.due(last)
         if len(accepted) > 1 and self.moves.while_moving is None:
-            begun = max(self.clock.now(), last.answered + self.takes_s)
+            stays_until = self.clock.now() + STAYS_S
             seen += self.watch(
-                begun + min(len(accepted) * self.takes_s, _QUEUE_S),
-                lambda so_far: so_far[-1].sent > begun and self.saw_rest(so_far),
+                max(stays_until, last.answered + min(len(accepted) * self.takes_s, _QUEUE_S)),
+                lambda so_far: so_far[-1].sent > stays_until and self.saw_rest(so_far),
             )
             due = max(due, seen[-SEVERAL:][0].sent)
             if not self.rests:
