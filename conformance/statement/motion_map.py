@@ -277,10 +277,6 @@ class Switch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     shows: dict[str, Any] = {}
     within_s: Positive = 2.0
 
-    def reading_of(self, value: Any) -> Any:
-        """Return the reading that means a sent value."""
-        return self.shows.get(str(value), value)
-
 
 class Stop(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How the device is stopped.

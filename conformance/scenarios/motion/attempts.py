@@ -185,7 +185,7 @@ def _tries_of(sender: _Sender) -> Iterator[Attempts]:
     if lease and (lease.header or "{lease}" in f"{sender.given.send} {sender.given.body}"):
         yield partial(sender.send_without_lease, away)
     if sender.given.body is not None:
-        if not sender.is_form(away):  # almost any text is a valid form
+        if "form" not in sender.mapped.request_of(sender.given, away).media_type:  # almost any text is a valid form
             yield partial(sender.send_broken, away)
         yield partial(sender.vanish, away)
 
@@ -209,10 +209,6 @@ class _Sender:
     def is_invalid(self, values: dict[str, Any]) -> bool:
         """Return whether the description forbids a command."""
         return self.mapped.binding.forbids(*self.mapped.call_of(self.given, values))
-
-    def is_form(self, values: dict[str, Any]) -> bool:
-        """Return whether a command is written as a form."""
-        return "form" in self.mapped.request_of(self.given, values).media_type
 
     def send(self, kind: str, what: str, values: dict[str, Any], *, authorized: bool = True) -> Iterator[Tried]:
         """Send a command."""

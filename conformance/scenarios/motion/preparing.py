@@ -11,7 +11,7 @@ from conformance.scenarios.motion.binding import Binding
 from conformance.scenarios.motion.templates import NoValueError, at, fill
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_map import Lease, Step
-from conformance.transport.client import Headers, is_drafting
+from conformance.transport.client import is_drafting
 from conformance.transport.exchange import Exchange, Outgoing
 
 # Share of the time between two renewals after which a lease is renewed.
@@ -107,12 +107,8 @@ class Preparation:
         lease = self.motion.lease
         if not (lease and self.lease and lease.header):
             return made
-        headers = (*self.without_lease(made.headers), (lease.header, self.lease))
-        return Outgoing(made.method, made.target, headers, made.body)
-
-    def without_lease(self, headers: Headers) -> Headers:
-        """Return header fields without that of the lease."""
-        return tuple(pair for pair in headers if not self.motion.lease or pair[0] != self.motion.lease.header)
+        others = (pair for pair in made.headers if pair[0] != lease.header)
+        return Outgoing(made.method, made.target, (*others, (lease.header, self.lease)), made.body)
 
     def end(self) -> None:
         """Send the last commands, and release the lease.

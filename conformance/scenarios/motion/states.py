@@ -95,7 +95,7 @@ def switched(mapped: MappedDevice) -> tuple[Switched, ...]:
 def _switch(mapped: MappedDevice, name: str, value: object) -> Switched:
     switch = mapped.motion.switches[name]
     command = mapped.send(mapped.request_of(switch, {"value": value}))
-    shown, wanted = None, switch.reading_of(value)
+    shown, wanted = None, switch.shows.get(str(value), value)
     for _ in poll_for(mapped.clock, _STEP_S, switch.within_s):
         shown = _read_switch(mapped, name)
         if shown == wanted:
