@@ -84,6 +84,7 @@ _IS_FINAL: Final = re.compile(
     r"\b(?:(?:is|are) (?:final|terminal)|for ?ever|never changes? (?:again|any more))\b",
     re.IGNORECASE,
 )
+_STAYS_SO: Final = re.compile(r"\b(?:stays|remains) `?([\w-]+)`?(?=[.;]|$)")
 _UNLESS: Final = re.compile(r"\b(?:not|no|if|unless|until|when|while|before|after|except|others?)\b", re.IGNORECASE)
 # What the description does not exclude.
 _OWN_REASON: Final = "the thing may have changed its state for a reason of its own"
@@ -429,6 +430,7 @@ def _final(read: Operation, name: str, operations: Iterable[Operation]) -> froze
     own.append(str(given.get("description", "")))
     said = [found[1] for text in own for found in _IS_FINAL.finditer(text) if not _UNLESS.search(found[1])]
     words = {word for text in said for word in re.findall(r"[\w-]+", text.casefold())}
+    words |= {word for text in own for word in _STAYS_SO.findall(text.casefold()) if word in FINAL}
     return frozenset(str(item) for item in given.get("enum", ()) if str(item).casefold() in words)
 
 

@@ -20,6 +20,7 @@ from typing import Any, Final, NamedTuple
 
 from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, merged, partly_patched, patched, same, shows_new
 from conformance.api.rest.references import collections_of, is_free_text
+from conformance.api.rest.samples import fits
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import (
     SET,
@@ -486,8 +487,9 @@ class Writes:
             if value is None:
                 default = shape.get("default")
                 expected = f"no {name}, which {change.label} removed by null (RFC 7396 2)"
-                # An empty value may be how the device shows that there is none.
-                is_kept = same(now, was) and not same(was, default) and was not in ("", [], {})
+                # Where the thing always has the member, null may set a default; and it may be shown as empty.
+                is_needed = name in flat(item.shape or {}).get("required", ()) and not fits(shape, None)
+                is_kept = same(now, was) and not (same(was, default) or is_needed) and was not in ("", [], {})
                 wrong = f"{clip(was)} as {name}" if is_kept and change.is_settled(name, change.sent_value) else ""
             elif isinstance(value, dict) and isinstance(was, dict) and isinstance(now, dict):
                 made = merged(was, value)

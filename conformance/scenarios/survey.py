@@ -14,14 +14,17 @@ from conformance.api.rest.calls import Call
 from conformance.api.rest.inputs import Inputs, request_of, usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.invalid_variations import unacceptable, undeclared_types
+from conformance.api.rest.samples import fits
 from conformance.api.rest.statuses import HELD, differ
 from conformance.api.rest.things import collection_of
 from conformance.api.rest.validity import UNCLEAR, VALID, Validity, validity
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import UNKNOWN, Kind, Variation, least_inputs, most_references
 from conformance.checkers.untouched import ALONE, OFTEN
+from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json, known_path, operations_of
 from conformance.documents.patterns import SlowPatternError
+from conformance.documents.representation import flat
 from conformance.scenarios.drawing import draw_requests, has_input, order_of
 from conformance.scenarios.lists import Paged
 from conformance.scenarios.reaching import CONFLICT, WANTS_CONDITION, Reaching
@@ -323,7 +326,7 @@ class Surveyor:
                 return
 
     def _candidates(self, operation: Operation) -> Iterator[Inputs]:
-        """Yield inputs of the usual request; last, those with a demanded condition or a new thing."""
+        """Yield inputs of the usual request; last, those with a demanded condition, a new thing, or what is there."""
         tried, statuses = usual_inputs(operation, self.values)[:4], self.api.usual_status
         yield from tried
         if statuses.get(operation.label) in WANTS_CONDITION and not operation.safe:
@@ -331,6 +334,17 @@ class Surveyor:
             yield tried[0]
         if statuses.get(operation.label) == CONFLICT and self.reaching.finds_new(operation, tried[0]):
             yield usual_inputs(operation, self.values)[0]
+        yield from self._shown(operation, tried[0])
+
+    def _shown(self, operation: Operation, inputs: Inputs) -> Iterator[Inputs]:
+        """Yield inputs of a PUT with what a read of the same path shows, which no rule in words forbids."""
+        first, body = self.api.first.get(f"GET {operation.template}"), operation.bodies.get(inputs.media_type)
+        if operation.method == "PUT" and first is not None and body is not None and is_json(inputs.media_type):
+            value, parts = read_json(first.response.body).value, flat(body.schema).get("properties", {})
+            there = value.items() if isinstance(value, dict) else ()
+            made = {name: one for name, one in there if name in parts and not flat(parts[name]).get("readOnly")}
+            if made and fits(body.schema, made):
+                yield replace(inputs, body=made)
 
     def cut_short(self, what: str) -> None:
         """Count a request that time did not allow."""

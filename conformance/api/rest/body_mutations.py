@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from conformance.api.mutations import STRANGE_NAME, STRANGE_TEXT, Member, Mutation, broken_members
-from conformance.api.rest.samples import sample
+from conformance.api.rest.samples import alike_and_apart, sample
 from conformance.api.rest.variations import with_member
 from conformance.documents.json_schema import Schema, kind_of, numbers_in, types_of
 from conformance.documents.json_shape import shape_of
@@ -247,7 +247,10 @@ def _of_bounds(whole: Any, place: Place) -> Iterator[Mutation[bytes]]:
     if schema.get("minItems", 0) > 0 and isinstance(place.value, list):
         beyond.append(("too few items", place.value[: schema["minItems"] - 1]))
     if schema.get("maxItems", _LONGEST) < _LONGEST and isinstance(place.value, list) and place.value:
-        beyond.append(("too many items", [place.value[0]] * (schema["maxItems"] + 1)))
+        count = schema["maxItems"] + 1
+        # Equal items may be refused for that.
+        apart = alike_and_apart({**schema, "minItems": count})[1]
+        beyond.append(("too many items", apart or [place.value[0]] * count))
     if kind_of(schema) == "integer":
         beyond.append(("a fraction", 0.5))
     for what, new in beyond:

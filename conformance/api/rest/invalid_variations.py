@@ -24,7 +24,7 @@ from conformance.api.rest.variations import (
     place_of,
     with_member,
 )
-from conformance.documents.json_schema import Schema, kinds_of
+from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.representation import flat
 
@@ -177,15 +177,21 @@ def _beyond(schema: Schema) -> Iterator[tuple[Any, str]]:
         bound = schema.get(key)
         if isinstance(bound, int | float) and not isinstance(bound, bool):
             yield bound + step, f"beyond its {key}" if step else f"at its {key}"
+    factor, made = schema.get("multipleOf"), sample(schema)
+    if isinstance(factor, int | float) and is_number(made) and factor not in (0, 1):
+        between = made + (1 if kinds_of(schema) == {"integer"} else factor / 2)
+        yield between, "which is no multiple of its multipleOf"
     yield from _beyond_texts(schema)
     if isinstance(schema.get("enum"), list) and schema["enum"]:
         yield UNKNOWN, "which is none of its values"
         if all(isinstance(item, str) for item in schema["enum"]):
             yield f"{UNKNOWN}é", _NOT_ASCII
     if isinstance(schema.get("maxItems"), int) and schema["maxItems"] <= _MOST_ITEMS:
-        items = schema.get("items")
+        items, count = schema.get("items"), schema["maxItems"] + 1
         one = sample(items if isinstance(items, dict) else {})
-        yield [copy.deepcopy(one) for _ in range(schema["maxItems"] + 1)], "with more items than its maxItems"
+        # Equal items may be refused for that.
+        apart = alike_and_apart({**schema, "minItems": count})[1]
+        yield apart or [copy.deepcopy(one) for _ in range(count)], "with more items than its maxItems"
     if isinstance(schema.get("minItems"), int) and 0 < schema["minItems"] <= _MOST_ITEMS:
         items = schema.get("items")
         one = sample(items if isinstance(items, dict) else {})

@@ -16,7 +16,7 @@ _BELT = {
     "properties": {
         "id": {"type": "string"},
         "state": {
-            "enum": ["stopped", "running", "paused", "done", "scrapped"],
+            "enum": ["stopped", "running", "paused", "done", "scrapped", "cancelled"],
             "description": "It becomes `scrapped` by wear; that is final.",
         },
         "runs": {},
@@ -35,6 +35,7 @@ _SAID = {
     "clean": "409 if it is running, paused already, or has goods.",
     "grease": "409 if the belt is running and nobody watches it. Refused if the motor is stopped.",
     "ship": "While a part of the belt is paused, and while the belt is archived, it is refused with 409.",
+    "drop": "A belt is cancelled at once and stays cancelled. One that is done stays running, done or not.",
     "seal": "Seal the belt once. The second time is refused with 409.",
     "restore": "409 if it is not archived. If it was paused, it is then paused.",
 }
@@ -103,6 +104,10 @@ _BROKEN = {
         _STATES,
     ),
     "a scrapped one that is done": ([("GET . 200", "scrapped"), ("GET . 200", "stopped")], _STATES),
+    "one that stays cancelled is done": (
+        [("GET 1 200", "cancelled"), ("POST 2/goods 200",), ("POST . 200",), ("GET 1 200", "done")],
+        _STATES,
+    ),
     "sealed twice": ([("POST /seal 200",), ("GET . 200", "stopped"), ("POST /seal 200",)], _STATES),
     "a refused start counts": (_refused("start", 1, 2, 3), _KEEPS),
 }

@@ -63,6 +63,10 @@ _PATHS = {
         **_item(MERGE, _SCHEMA),
         "put": {**_item(MERGE, _SCHEMA)["put"], "summary": "If version is not the present one, 409."},
     },
+    "/needed": {
+        **_item(MERGE, _SCHEMA),
+        "get": {"responses": {**_OK, "200": answers({**_SCHEMA, "required": ["gain"]})}},
+    },
     "/reset": {"post": {"responses": _OK}},
 }
 READ, KEPT, DEFAULTS = (f"description/{name}" for name in ("written-is-read", "refused-keeps", "defaults"))
@@ -178,6 +182,9 @@ BROKEN = {
         [_get("/merge"), _patch("/merge", {"from": _EAST}), _get("/merge", **{"from": "2026-02-01T12:34:56Z"})], READ,
     ),
     "the time of the last change stays": (_two_changes(createdAt=_OLD, updatedAt=_OLD), READ),
+    "null keeps what the thing need not have": (
+        [_get("/needed"), _patch("/needed", {"note": None}, **_FIRST), _get("/needed")], PATCH,
+    ),
     "null keeps": ([_get("/merge"), _patch("/merge", {"note": None}, **_FIRST), _get("/merge")], PATCH),
     "null keeps, seen by another change": (
         [_get("/merge"), ("PATCH", "/merge", {"note": None, "gain": 2.5}, 204, None), _get("/merge", gain=2.5)], PATCH,
@@ -339,6 +346,7 @@ RIGHT = {
     "a time in seconds stays": _two_changes(createdAt=[7.5] * 3, updatedAt=[7.5] * 3),
     "it has only just changed": _two_changes(createdAt=_OLD, updatedAt=[_NEW[0]] * 3),
     "null for what is readOnly": [_get("/merge"), _patch("/merge", {"built": None}), _get("/merge")],
+    "null for what the thing always has": [_get("/needed"), _patch("/needed", {"gain": None}), _get("/needed")],
     "null sets the default": [_get("/merge"), _patch("/merge", {"mode": None}, mode="on"), _get("/merge", mode="on")],
     "null in plain JSON": [_get(), _patch("/plain", {"note": None}), _get()],
     "an object merged": [
@@ -419,7 +427,11 @@ def _broken(contract, steps):
     checkers, now, broken = RestCheckers(contract, BASE), 1000.0, set()
     for method, path, sent, status, seen in steps:
         now += 1.0
-        kinds = {"/merge": MERGE, "/kept": MERGE, "/steps": STEPS, "/things/1": MERGE} if method == "PATCH" else {}
+        kinds = (
+            {"/merge": MERGE, "/kept": MERGE, "/needed": MERGE, "/steps": STEPS, "/things/1": MERGE}
+            if method == "PATCH"
+            else {}
+        )
         fields = [("Host", "device:8000"), *([("Content-Type", kinds.get(path, "application/json"))] if sent else [])]
         body = json.dumps(sent).encode() if sent else b""
         answer = json.dumps(seen).encode() if seen is not None and status < 300 else b""
