@@ -334,9 +334,9 @@ class Surveyor:
             yield tried[0]
         if statuses.get(operation.label) == CONFLICT and self.reaching.finds_new(operation, tried[0]):
             yield usual_inputs(operation, self.values)[0]
-        yield from self._shown(operation, tried[0])
+        yield from self._as_read(operation, tried[0])
 
-    def _shown(self, operation: Operation, inputs: Inputs) -> Iterator[Inputs]:
+    def _as_read(self, operation: Operation, inputs: Inputs) -> Iterator[Inputs]:
         """Yield inputs of a PUT with what a read of the same path shows, which no rule in words forbids."""
         first, body = self.api.first.get(f"GET {operation.template}"), operation.bodies.get(inputs.media_type)
         if operation.method == "PUT" and first is not None and body is not None and is_json(inputs.media_type):
