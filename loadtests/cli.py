@@ -303,7 +303,8 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
         for line in stops_lines(result.file):
             say(line)
         summary.seek(0)
-        say(summary.read().rstrip("\n"))
+        if text := summary.read().rstrip("\n"):
+            say(text)
     return kept.after(result, tolerance, context.obj)._replace(tell=not as_json)
 
 

@@ -56,7 +56,7 @@ class Winch(Device):
             return None
         if name == "Stop" and self._fault != "ignores":
             self._speed = 0.0
-        if name == "Drive":
+        if name == "Drive" and not (self._speed and self._fault == "ignores"):
             self._speed = float(payload.findtext("{*}Ahead"))
         inside = f"<c:X>{self._x}</c:X>" if name == "GetState" else ""
         return f'<c:{name}Response xmlns:c="urn:winch">{inside}</c:{name}Response>'

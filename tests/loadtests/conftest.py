@@ -95,8 +95,10 @@ class Loaded:
         assert file.is_file(), f"exit code {self.code} without a result: {self.out + self.err}"
         result = json.loads(file.read_text())
         jsonschema.Draft202012Validator(SCHEMA).validate(result)
-        short, sentence = latency_markdown(result), result["headline"]["sentence"]
-        assert plain(sentence, 1500) in short
+        short, (words, sentence) = latency_markdown(result), (result["headline"][key] for key in ("words", "sentence"))
+        # What a heading says is not said again below it, and what is left begins with a capital letter.
+        assert plain(words, 1500) in short
+        assert plain(sentence.removeprefix(words).lstrip(".: ")[1:], 1500) in short
         assert not self.out or self.out.rstrip().endswith(sentence)
         assert not re.search(r"\b(None|nan)\b", short + self.out)
         return result

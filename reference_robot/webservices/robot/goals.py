@@ -177,21 +177,20 @@ class Goals:
         # Cancel all goals: another goal may have displaced the known one a moment ago.
         doomed = [goal.identity for goal in self._subscribers.goals.active()]
         reply = await self._calls.result(self._publishers.cancel_all_goals, "the navigation's cancel service")
-        if current is not None and await self._is_refused(reply, current):
+        if current is not None and await self._is_refused(reply, own):
             raise Problem(409, f"the navigation refuses to cancel goal {current['goal_id']['id']!a}")
         # The goal is cancelled, unknown or ended: in each case no longer current.
         if self._own is own:
             self._own = None
         self._known.extend(doomed if current is None else [*doomed, current["goal_id"]["id"]])
 
-    async def _is_refused(self, reply: CancelGoal.Response, current: dict[str, Any]) -> bool:
+    async def _is_refused(self, reply: CancelGoal.Response, own: _Goal | None) -> bool:
         """Return whether the navigation goes on with a goal; rclpy's servers refuse with an empty list, and no code."""
-        if reply.return_code != CancelGoal.Response.ERROR_NONE or reply.goals_canceling:
+        if reply.return_code != CancelGoal.Response.ERROR_NONE or reply.goals_canceling or own is None:
             return bool(reply.return_code == CancelGoal.Response.ERROR_REJECTED)
         # A goal that has just ended is not in the list either.
         for _ in range(round(_REASON_COMES_WITHIN / _REASON_STEP)):
-            left = self.current()
-            if left is None or left["goal_id"] != current["goal_id"]:
+            if self._active_own() is not own:
                 return False
             await asyncio.sleep(_REASON_STEP)
         return True
