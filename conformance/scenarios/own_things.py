@@ -245,12 +245,12 @@ class _Thing:
     def _singly(self, change: Operation, bodies: list[Any], *, whole_last: bool) -> list[Any]:
         """Return bodies of several writes: each member alone, and all together, which restores them.
 
-        A PATCH writes all twice, in either order: it must leave the others as they are. A PUT writes all, and then few.
+        A PATCH writes all twice, in either order: it must leave the others as they are. A PUT writes all, few, all.
         """
         is_patch, now = change.method == "PATCH", self._members()
         singles = bodies[:-1][:_SINGLES] if is_patch else bodies[-3:-1]
         old = [{name: now[name] for name in singles[0] if name in now}] if is_patch and len(singles) > 1 else []
-        again = [*old, *(reversed(singles) if old else ())]
+        again = [*old, *(reversed(singles) if old else ())] if is_patch else bodies[-1:] if singles else []
         return [*bodies[:-1], *again, *bodies[-1:]] if whole_last else [*bodies[-1:], *singles, *again]
 
     def _send_refusable(self, change: Operation, bodies: Sequence[Any] = ()) -> None:
