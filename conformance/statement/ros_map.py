@@ -195,7 +195,7 @@ class Parameter(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
     Attributes:
         parameter: its name.
         node: the node's full name.
-        type: of its value, as rcl_interfaces/msg/ParameterType names it, in small letters.
+        type: of its value: a name of rcl_interfaces/msg/ParameterType in lower case, without PARAMETER_.
         sets: whether it sets the value; None: if its method is not GET.
         refused: the statuses when the node refuses a value; empty: any error.
     """
