@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterator
 from typing import Any, Final
 
+from conformance.rules.ros_gateway.arrivals import Request, counts
 from conformance.rules.ros_gateway.judging import change_text, differing, fails_as, statuses
 from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.services import ROUNDS, Called, Crowd, Server, Services, is_held, service_calls
@@ -77,15 +78,17 @@ def once(trace: Services) -> Iterator[Outcome]:
 def _judge_reach(crowd: Crowd) -> Iterator[Outcome]:
     """Judge whether of many calls at once none reaches the server twice, and each that succeeds does once."""
     body = crowd.body
-    keys = [_key(json.loads(request), body) for request in crowd.requests]
-    sent = Counter(keys)
-    heard = Counter(_key(message.content, body) for message in crowd.heard if message.what == "request")
-    done = Counter(key for key, attempt in zip(keys, crowd.attempts, strict=True) if is_success(attempt, body))
-    for key, attempt in zip(keys, crowd.attempts, strict=True):
-        calls = f"{done[key]} to {sent[key]}" if done[key] < sent[key] else f"{sent[key]}"
-        expected = f"{calls} calls of {body.service} for {sent[key]} equal requests, {len(keys)} requests at once"
-        cause = "lost" if heard[key] < done[key] else "doubled"
-        yield Case(done[key] <= heard[key] <= sent[key], attempt, expected, f"{heard[key]} calls", cause)
+    # One that failed may have reached the server.
+    requests = [
+        Request(attempt, _key(json.loads(request), body), is_success(attempt, body) or None)
+        for request, attempt in zip(crowd.requests, crowd.attempts, strict=True)
+    ]
+    heard = [_key(message.content, body) for message in crowd.heard if message.what == "request"]
+    for one, came, least, most in counts(requests, heard):
+        calls = f"{least} to {most}" if least < most else f"{most}"
+        expected = f"{calls} calls of {body.service} for {most} equal requests, {len(requests)} requests at once"
+        cause = "lost" if came < least else "doubled"
+        yield Case(least <= came <= most, one.sent, expected, f"{came} calls", cause)
 
 
 @rule("ros-gateway/service-failure", on=(service_calls,))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from statistics import median_low
 from typing import Final
 
+from conformance.rules.ros_gateway.arrivals import Request, counts, in_order, refused
+from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind
 from conformance.scenarios.ros.topics import (
     Burst,
@@ -164,26 +166,40 @@ def _fields_in(message: dict[str, object], one: Sent, ros: RosMap) -> dict[str, 
 def once(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether each accepted request is exactly one message. Messages without a request are other publishers'."""
     for number, burst in enumerate(trace):
-        same_operation = [one for one in trace if one.operation == burst.operation]
-        sent = [message for each in same_operation for message in each.sent if message.value]
-        after = [each for one in trace[number:] if one.operation == burst.operation for each in one.heard]
-        wanted = {message.value: _fields_in(json.loads(message.value), message, ros) for message in sent}
-        strange = [each for each in burst.heard if not any(equal(each.content, item) for item in wanted.values())]
-        for message in burst.sent:
-            if not message.accepted or not message.value:
+        requests, wanted = _asked((one for one in trace if one.operation == burst.operation), ros)
+        after = (each for one in trace[number:] if one.operation == burst.operation for each in one.heard)
+        is_strange, own = None in _keys(burst.heard, wanted), set(map(id, burst.sent))
+        for request, came, least, _ in counts(requests, _keys(after, wanted)):
+            message = request.sent
+            if id(message) not in own or not message.accepted or least > 1:
                 continue
-            if sum(other.accepted and wanted[other.value] == wanted[message.value] for other in sent) > 1:
-                continue
-            same = sum(equal(each.content, wanted[message.value]) for each in after)
             expected = f"one message on {message.topic} for an accepted request ({burst.how})"
-            if same == 1 or (same > 1 and _is_blank(wanted[message.value])):
+            if came == 1 or (came > 1 and _is_blank(_fields_in(json.loads(message.value), message, ros))):
                 yield Case(True, message.exchange, expected)
-            elif same:
-                yield Case(False, message.exchange, expected, f"{same} equal messages", f"{message.operation} several")
+            elif came:
+                yield Case(False, message.exchange, expected, f"{came} equal messages", f"{message.operation} several")
             elif not burst.reliable:
                 yield NotTested(f"of {burst.how}, some of {message.topic} may be lost on the way")
-            elif not strange:  # else it came, and was changed
+            elif not is_strange:  # else it came, and was changed
                 yield Case(False, message.exchange, expected, f"none on {message.topic}", f"{message.operation} none")
+
+
+def _asked(bursts: Iterable[Burst], ros: RosMap) -> tuple[list[Request[Sent]], list[dict[str, object]]]:
+    """Return the messages that were asked for, and their different contents, whose indexes are the keys."""
+    requests: list[Request[Sent]] = []
+    wanted: list[dict[str, object]] = []
+    for message in (message for burst in bursts for message in burst.sent if message.value):
+        content = _fields_in(json.loads(message.value), message, ros)
+        key = next((key for key, one in enumerate(wanted) if equal(one, content)), len(wanted))
+        wanted += [content] * (key == len(wanted))
+        requests.append(Request(message, key, message.accepted, message.client))
+    return requests, wanted
+
+
+def _keys(heard: Iterable[Heard], wanted: list[dict[str, object]]) -> list[int | None]:
+    """Return the key of each message that came; None: no request asked for it."""
+    contents = [each.content for each in heard]
+    return [next((key for key, one in enumerate(wanted) if equal(each, one)), None) for each in contents]
 
 
 def _is_blank(value: object) -> bool:
@@ -197,18 +213,11 @@ def _is_blank(value: object) -> bool:
 def order(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether the messages of one client are published in the order of its requests."""
     for burst in trace:
-        heard = [each.content for each in burst.heard]
-        wanted = [_fields_in(json.loads(one.value), one, ros) for one in burst.sent]
-        before: dict[int, int] = {}
-        for one, message in zip(burst.sent, wanted, strict=True):
-            place = next((place for place, each in enumerate(heard) if equal(each, message)), None)
-            if place is None or wanted.count(message) > 1:
-                continue  # of equal messages, it is open which is which
-            if one.client in before:
-                expected = f"the messages on {one.topic} in the order of the requests ({burst.how})"
-                holds, found = before[one.client] < place, "one before that of an earlier request"
-                yield Case(holds, one.exchange, expected, found, one.operation)
-            before[one.client] = place
+        requests, wanted = _asked([burst], ros)
+        for request, holds in in_order(requests, _keys(burst.heard, wanted)):
+            one = request.sent
+            expected = f"the messages on {one.topic} in the order of the requests ({burst.how})"
+            yield Case(holds, one.exchange, expected, "one before that of an earlier request", one.operation)
 
 
 @rule("ros-gateway/refused-nothing", on=(topic_refusals, topic_writes))
@@ -217,12 +226,10 @@ def refused_nothing(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
     if all(message.accepted for burst in trace for message in burst.sent):
         yield NotClaimed("the gateway refused no request")
     for burst in trace:
-        for message in burst.sent:
-            if message.accepted:
-                continue
-            heard = [each.content for each in burst.heard]
-            if message.value:
-                heard = [each for each in heard if equal(each, _fields_in(json.loads(message.value), message, ros))]
+        requests, wanted = _asked([burst], ros)
+        came = {id(one.sent): count for one, count in refused(requests, _keys(burst.heard, wanted))}
+        for message in (message for message in burst.sent if not message.accepted):
+            holds = not (came[id(message)] if message.value else burst.heard)
             expected = f"no message on {message.topic}, as the request was refused ({message.what})"
-            shown = json.dumps(heard[0])[:_SHOWN] if heard else ""
-            yield Case(not heard, message.exchange, expected, f"the message {shown}", cause=message.operation)
+            found = f"the message {(message.value or burst.heard[0].value)[:_SHOWN]}" if not holds else ""
+            yield Case(holds, message.exchange, expected, found, cause=message.operation)

@@ -1,6 +1,5 @@
 """Rules on deliveries: each accepted request becomes one identical ROS message, and so does each Idempotency-Key."""
 
-from collections import Counter
 from collections.abc import Iterator
 from http import HTTPStatus
 from itertools import chain
@@ -15,11 +14,14 @@ from conformance.packs.table1.scenarios.deliveries import (
     deliveries_last,
     deliveries_later,
 )
+from conformance.rules.ros_gateway.arrivals import Request, counts, in_order, refused
 from conformance.scenarios.rule import NotTested, Outcome, Rule, rule
 from conformance.verdict.evidence import Case
 
 # By how a delivery was sent: the interfaces, if it must make two messages.
 _TWO: Final = {"same": ["rest", "soap"], "twice": ["rest", "rest"]}
+# How a delivery was sent that has one place in the order.
+_ALONE: Final = ("rest", "soap", "coffee")
 # Batches with messages that the suite did not cause, before they count as a failure: the robot may have other clients.
 _OFTEN: Final = 2
 
@@ -55,16 +57,10 @@ def delivery_order(trace: Deliveries) -> Iterator[Outcome]:
         for interface in ("rest", "soap"):
             # A delivery with two messages has no single place in the order, nor has one that was sent at the same time
             # as others.
-            ordered = [
-                message for message in _accepted_in(batch) if message.interface == interface and message.how not in _TWO
-            ]
-            ordered = [message for message in ordered if message.how != "together"]
-            wanted = [trace.key(message.delivery) for message in ordered]
-            found = list(dict.fromkeys(key for key in _keys(trace, batch) if key in wanted))
-            arrived = [key for key in wanted if key in found]
-            if len(arrived) > 1:
+            ordered = [one for one in _requests(trace, batch) if one.client == interface and one.sent.how in _ALONE]
+            for one, holds in in_order([one for one in ordered if one.accepted], _keys(trace, batch)):
                 expected = f"deliveries over {interface} in the order in which they were sent"
-                yield Case(found == arrived, ordered[-1].exchange, expected, "another order")
+                yield Case(holds, one.sent.exchange, expected, "another order")
 
 
 @rule("equivalence/delivery-only", on=(deliveries, deliveries_later))
@@ -73,12 +69,12 @@ def delivery_only(trace: Deliveries) -> Iterator[Outcome]:
     for batch, before in trace.batches_to_judge():
         exchange = next((message.exchange for message in _accepted_in(batch)), None)
         found, cause = "", ""
-        again, refused, unsent = _others(trace, batch, before)
+        again, unwanted, unsent = _others(trace, batch, before)
         if again:
             one, exchange = again[0], again[0].exchange
             found, cause = f"an earlier message once more: {one.delivery}", "later"
-        elif refused:
-            one, exchange = refused[0], refused[0].exchange
+        elif unwanted:
+            one, exchange = unwanted[0], unwanted[0].exchange
             found, cause = f"the message of a request that was not accepted: {one.delivery}", "not accepted"
         elif unsent and sum(bool(_others(trace, *earlier)[2]) for earlier in _all(trace, batch)) >= _OFTEN:
             exchange, found, cause = None, f"a message that no client of the suite sent: {unsent[0]}", "not sent"
@@ -88,15 +84,13 @@ def delivery_only(trace: Deliveries) -> Iterator[Outcome]:
 def _arrives_once(trace: Deliveries, how: str) -> Iterator[Case]:
     """Yield a case for each accepted delivery that was sent in this way, and for each of its messages that is late."""
     for batch, before in trace.batches_to_judge():
-        accepted = _accepted_in(batch)
-        arrived = Counter(_keys(trace, batch))
-        wanted = Counter(trace.key(message.delivery) for message in accepted)
+        requests = _requests(trace, batch)
+        wanted = {one.key for one in requests if one.accepted}
         others = [sighting.delivery for sighting in batch.seen if trace.key(sighting.delivery) not in wanted]
-        for message in accepted:
-            if message.how == how:
-                key = trace.key(message.delivery)
-                problem = _problem(arrived[key], wanted[key], others) or _wrong_interfaces(trace, batch, message)
-                yield _once(message, problem, problem.partition(",")[0])
+        for one, came, least, most in counts(requests, _keys(trace, batch)):
+            if one.accepted and one.sent.how == how:
+                problem = _problem(came, least, most, others) or _wrong_interfaces(trace, batch, one.sent)
+                yield _once(one.sent, problem, problem.partition(",")[0])
         for message in _others(trace, batch, before)[0]:
             if message.how == how:
                 yield _once(message, "one more message, later", "later")
@@ -107,11 +101,11 @@ def _once(one: Sent, problem: str, cause: str) -> Case:
     return Case(not problem, one.exchange, expected, problem, f"{one.interface} {cause}")
 
 
-def _problem(count: int, due: int, others: list[Delivery]) -> str:
+def _problem(came: int, least: int, most: int, others: list[Delivery]) -> str:
     """Return how the messages of a delivery differ from those that are due, or an empty text."""
-    if count == due:
+    if least <= came <= most:
         return ""
-    return f"{count} messages instead of {due}" if count or not others else f"another message, {others[0]}"
+    return f"{came} messages instead of {least}" if came or not others else f"another message, {others[0]}"
 
 
 def _wrong_interfaces(trace: Deliveries, batch: Batch, one: Sent) -> str:
@@ -134,13 +128,14 @@ def _others(
     sent = list(chain.from_iterable(one.sent for one in (*before, batch)))
     known |= {trace.key(message.delivery) for message in sent if message.may_arrive}
     earlier = {trace.key(message.delivery): message for message in chain.from_iterable(map(_accepted_in, before))}
-    refused = {trace.key(message.delivery): message for message in sent if not message.is_ok and not message.may_arrive}
+    not_accepted = refused(_requests(trace, *before, batch), _keys(trace, batch))
+    unwanted = {one.key: one.sent for one, came in not_accepted if came and one.key not in known}
     others = [sighting.delivery for sighting in batch.seen if trace.key(sighting.delivery) not in known]
     keys = [trace.key(delivery) for delivery in others]
     return (
         [earlier[key] for key in keys if key in earlier],
-        [refused[key] for key in keys if key in refused],
-        [delivery for delivery, key in zip(others, keys, strict=True) if key not in earlier and key not in refused],
+        list(unwanted.values()),
+        [delivery for delivery, key in zip(others, keys, strict=True) if key not in earlier and key not in unwanted],
     )
 
 
@@ -154,6 +149,15 @@ def _all(trace: Deliveries, last: Batch) -> Iterator[tuple[Batch, tuple[Batch, .
 
 def _accepted_in(batch: Batch) -> list[Sent]:
     return [message for message in batch.sent if message.is_ok]
+
+
+def _requests(trace: Deliveries, *batches: Batch) -> list[Request[Sent]]:
+    """Return the deliveries of batches as requests for one message each; those over one interface have an order."""
+    return [
+        Request(one, trace.key(one.delivery), one.is_ok or (None if one.may_arrive else False), one.interface)
+        for batch in batches
+        for one in batch.sent
+    ]
 
 
 def _keys(trace: Deliveries, batch: Batch) -> list[bytes]:
