@@ -19,6 +19,7 @@ Each command is an object with "do"; each gets one answer. Times are of CLOCK_MO
 - `hold` (node, values, refuses): be a node of this name with parameters, each `[type, value]` by name, which change at
   once; with `refuses`, others may not change them. Events of the node: `set`, with the values that somebody set.
 - `held` (node): the values of its parameters.
+- `parameters`: by node, the parameters of all others, each `[type, value]` by name.
 - `forget` (name): leave a topic, service or action.
 - `graph`: topics with types and counts, services, how many clients these have, actions and nodes.
 """
@@ -32,6 +33,7 @@ from typing import Any, Final
 
 import rclpy
 from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.action import ActionServer, CancelResponse, GoalResponse, get_action_names_and_types
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
@@ -43,7 +45,7 @@ from rclpy.executors import (
     SingleThreadedExecutor,
 )
 from rclpy.node import Node
-from rclpy.parameter import Parameter
+from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
@@ -56,6 +58,8 @@ _DEPTH: Final = 5000
 _THREADS: Final = 48
 _STEP_S: Final = 0.01
 _LONGEST_S: Final = 60.0
+# For a node to tell its parameters, s.
+_ANSWERS_S: Final = 2.0
 
 Event = tuple[int, str, Any]
 
@@ -95,6 +99,7 @@ class Player:
             "script": self._script,
             "hold": self._hold,
             "held": lambda node: {"values": self._nodes[node].values()},
+            "parameters": self._parameters,
             "forget": self._forget,
             "graph": self._graph,
         }
@@ -153,6 +158,30 @@ class Player:
             self._executors[-1].add_node(made)
         self._nodes[node].hold(values, refuses=refuses)
         return {}
+
+    def _parameters(self) -> dict[str, Any]:
+        found: dict[str, dict[str, Any]] = {}
+        for node in self._graph()["nodes"]:
+            listed = self._ask(ListParameters, f"{node}/list_parameters", ListParameters.Request())
+            names = listed.result.names if listed else []
+            values = names and self._ask(GetParameters, f"{node}/get_parameters", GetParameters.Request(names=names))
+            for name, value in zip(names, values.values if values else (), strict=False):
+                kind = Parameter.Type(value.type).name.lower()
+                own = plain_parameter(kind, parameter_value_to_python(value))
+                found.setdefault(node, {})[name] = [kind, own]
+        return {"nodes": found}
+
+    def _ask(self, kind: Any, service: str, request: Any) -> Any:
+        """Return the response of a service; None: it does not respond in time."""
+        client, came = self._node.create_client(kind, service), threading.Event()
+        try:
+            if not client.wait_for_service(_ANSWERS_S):
+                return None
+            future = client.call_async(request)
+            future.add_done_callback(lambda _: came.set())
+            return future.result() if came.wait(_ANSWERS_S) else None
+        finally:
+            self._node.destroy_client(client)
 
     def _note(self, name: str, what: str, value: Any, at_ns: int | None = None) -> None:
         with self._news:

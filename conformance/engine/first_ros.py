@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from http import HTTPStatus
 from typing import Any, Final, NamedTuple, cast
 from urllib.parse import quote
@@ -20,6 +21,7 @@ from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.engine.commanded import body_schema, parts_of
+from conformance.engine.first_ros_parameters import parameters_of
 from conformance.engine.map_text import inline
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.ros.definition import FLOATS, INTEGERS, LONG, Definition, Shape, value_at
@@ -71,7 +73,8 @@ class Graph(NamedTuple):
     """Contents of the ROS graph: types by name of topic, service and action, and definitions of types.
 
     ``read`` has what operations returned, by label: the document, or the status of what was no success; ``named`` those
-    with values of their parameters, and the ROS names that lists give for them. ``is_named``: the graph is one such
+    with values of their parameters, and the ROS names that lists give for them; ``parameters`` those that read or set a
+    node's parameter, and their keys. ``is_named``: the graph is one such
     name, so that a body without declared fields may hold its messages.
     """
 
@@ -81,6 +84,7 @@ class Graph(NamedTuple):
     definition: Callable[[str], Definition]
     read: dict[str, Any]
     named: dict[str, tuple[Operation, str]]
+    parameters: dict[str, tuple[Operation, dict[str, Any]]]
     is_named: bool = False
 
     def only(self, name: str) -> Graph:
@@ -153,8 +157,13 @@ def ros_proposals(operations: Sequence[Operation], domain_id: int, client: HttpC
     read: dict[str, Any] = {}
     until = WALL_CLOCK.now() + _READS_S
 
-    def get(one: Operation) -> Any:
-        is_new = one.label not in read and one.method == "GET" and one.shape is not None and "{" not in one.template
+    def get(one: Operation, *, again: bool = False) -> Any:
+        is_new = (
+            (again or one.label not in read)
+            and one.method == "GET"
+            and one.shape is not None
+            and "{" not in one.template
+        )
         if is_new and WALL_CLOCK.now() < until:
             # A gateway may subscribe only when a client reads.
             with suppress(NoAnswerError):
@@ -175,8 +184,15 @@ def ros_proposals(operations: Sequence[Operation], domain_id: int, client: HttpC
             {name: types[name][0] for name in told[kind] if types[name] and not _COMMON.search(name)} for kind in _KINDS
         )
         named = {one.label: (one, name) for one, name in _with_values(operations, ends, get)}
-        graph = Graph(topics, services, actions, robot.definition, read, named)
-        yield from _map_lines([*operations, *(one for one, _ in named.values())], graph, domain_id)
+        parameters = {
+            one.label: (one, keys)
+            # A gateway may have found the node only after the first read.
+            for one, keys in parameters_of(operations, robot.tell("parameters")["nodes"], partial(get, again=True))
+            if one.label not in named
+        }
+        graph = Graph(topics, services, actions, robot.definition, read, named, parameters)
+        every = {one.label: one for one in (*operations, *(one for one, _ in (*named.values(), *parameters.values())))}
+        yield from _map_lines([*every.values()], graph, domain_id)
     finally:
         robot.close()
 
@@ -217,12 +233,12 @@ def _settled_graph(robot: Robot) -> dict[str, Any]:
 
 def _map_lines(operations: Sequence[Operation], graph: Graph, domain_id: int) -> Iterator[str]:
     """Yield the lines of a ROS map; operations that are guesses or do not fit become comments."""
-    found: dict[str, _Proposal] = {}
+    found = {label: _Proposal(keys) for label, (_, keys) in graph.parameters.items()}
     followers: set[str] = set()
     written: set[str] = set()
     # Topics that the gateway publishes come first: another operation hardly reads one of them.
     for operation in sorted(operations, key=lambda item: item.method == "GET"):
-        if "{" in operation.template:
+        if "{" in operation.template or operation.label in graph.parameters:
             continue
         there = graph.only(graph.named[operation.label][1]) if operation.label in graph.named else graph
         proposal = (

@@ -378,6 +378,8 @@ def _operation(call: str, table: dict[str, Any], where: str, error: type[TomlFil
     if isinstance(made, Parameter):
         # Its message is the value alone.
         made = msgspec.structs.replace(made, fields={"": "/value"})
+    if isinstance(made, Reads) and made.in_url:
+        raise error(f"{place}: in_url is of a request that sends a message; topic = {made.topic!r} is read: use values")
     strange = [name for name in getattr(made, "in_url", ()) if f"{{{name}}}" not in call]
     if strange:
         raise error(f"{place}: in_url has {strange[0]!r}, but the path and query have no {{{strange[0]}}}")

@@ -85,6 +85,7 @@ def test_the_domain_is_that_of_the_environment(monkeypatch):
         ("absent = [404, 503]", "absent = [200]", "must be a whole number from 400 to 599"),
         ('topic = "/odom"', 'topics = "/odom"', "one key of topic, publishes, service, action, parameter, lists must"),
         ("POST /api/v1/speed?x={x}", "PUT /v?x={y}", "in_url has 'x', but the path and query have no {x}"),
+        ("absent = [404, 503]", 'in_url = { x = "/child" }', "in_url is of a request that sends a message; topic"),
         ('topic = "/odom"', 'topic = "/odom", service = "/a"', "it has topic and service"),
         ("values = [false]", "value = [false]", "unknown key 'value'"),
         ("max_age_s", "max_age", "unknown key 'max_age'; known are"),
