@@ -65,7 +65,9 @@ def in_order(requests: Sequence[Request[_Sent]], heard: Sequence[Hashable]) -> I
             before[one.client] = places[one.key]
 
 
-def refused(requests: Sequence[Request[_Sent]], heard: Sequence[Hashable]) -> Iterator[tuple[Request[_Sent], int]]:
+def come_though_refused(
+    requests: Sequence[Request[_Sent]], heard: Sequence[Hashable]
+) -> Iterator[tuple[Request[_Sent], int]]:
     """Yield each refused request, with how many of its messages came that no other request asked for."""
     for one, came, _, most in counts(requests, heard):
         if one.accepted is False:

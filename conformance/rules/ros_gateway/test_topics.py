@@ -8,7 +8,7 @@ from dataclasses import replace
 from statistics import median_low
 from typing import Final
 
-from conformance.rules.ros_gateway.arrivals import Request, counts, in_order, refused
+from conformance.rules.ros_gateway.arrivals import Request, come_though_refused, counts, in_order
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind
 from conformance.scenarios.ros.topics import (
@@ -166,7 +166,7 @@ def _fields_in(message: dict[str, object], one: Sent, ros: RosMap) -> dict[str, 
 def once(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether each accepted request is exactly one message. Messages without a request are other publishers'."""
     for number, burst in enumerate(trace):
-        requests, wanted = _asked((one for one in trace if one.operation == burst.operation), ros)
+        requests, wanted = _requests_in((one for one in trace if one.operation == burst.operation), ros)
         after = (each for one in trace[number:] if one.operation == burst.operation for each in one.heard)
         is_strange, own = None in _keys(burst.heard, wanted), set(map(id, burst.sent))
         for request, came, least, _ in counts(requests, _keys(after, wanted)):
@@ -184,7 +184,7 @@ def once(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
                 yield Case(False, message.exchange, expected, f"none on {message.topic}", f"{message.operation} none")
 
 
-def _asked(bursts: Iterable[Burst], ros: RosMap) -> tuple[list[Request[Sent]], list[dict[str, object]]]:
+def _requests_in(bursts: Iterable[Burst], ros: RosMap) -> tuple[list[Request[Sent]], list[dict[str, object]]]:
     """Return the messages that were asked for, and their different contents, whose indexes are the keys."""
     requests: list[Request[Sent]] = []
     wanted: list[dict[str, object]] = []
@@ -213,7 +213,7 @@ def _is_blank(value: object) -> bool:
 def order(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether the messages of one client are published in the order of its requests."""
     for burst in trace:
-        requests, wanted = _asked([burst], ros)
+        requests, wanted = _requests_in([burst], ros)
         for request, holds in in_order(requests, _keys(burst.heard, wanted)):
             one = request.sent
             expected = f"the messages on {one.topic} in the order of the requests ({burst.how})"
@@ -226,8 +226,8 @@ def refused_nothing(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
     if all(message.accepted for burst in trace for message in burst.sent):
         yield NotClaimed("the gateway refused no request")
     for burst in trace:
-        requests, wanted = _asked([burst], ros)
-        came = {id(one.sent): count for one, count in refused(requests, _keys(burst.heard, wanted))}
+        requests, wanted = _requests_in([burst], ros)
+        came = {id(one.sent): count for one, count in come_though_refused(requests, _keys(burst.heard, wanted))}
         for message in (message for message in burst.sent if not message.accepted):
             holds = not (came[id(message)] if message.value else burst.heard)
             expected = f"no message on {message.topic}, as the request was refused ({message.what})"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.rules.ros_gateway.arrivals import Request, counts, in_order, refused
+from conformance.rules.ros_gateway.arrivals import Request, come_though_refused, counts, in_order
 
 TWO = [Request("first", 1, accepted=True, client="a"), Request("second", 2, accepted=True, client="a")]
 
@@ -38,7 +38,7 @@ def test_clients_have_no_order_among_each_other_and_neither_have_equal_messages(
 
 def test_a_refused_request_is_no_message_but_another_one_may_be_equal():
     no = Request("no", 1, accepted=False)
-    assert list(refused([no], [2])) == [(no, 0)]
-    assert list(refused([no], [2, 1])) == [(no, 1)]
-    assert list(refused([no, TWO[0]], [1])) == [(no, 0)]
-    assert list(refused([no, TWO[0]], [1, 1])) == [(no, 1)]
+    assert list(come_though_refused([no], [2])) == [(no, 0)]
+    assert list(come_though_refused([no], [2, 1])) == [(no, 1)]
+    assert list(come_though_refused([no, TWO[0]], [1])) == [(no, 0)]
+    assert list(come_though_refused([no, TWO[0]], [1, 1])) == [(no, 1)]

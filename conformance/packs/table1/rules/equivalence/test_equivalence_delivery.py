@@ -14,7 +14,7 @@ from conformance.packs.table1.scenarios.deliveries import (
     deliveries_last,
     deliveries_later,
 )
-from conformance.rules.ros_gateway.arrivals import Request, counts, in_order, refused
+from conformance.rules.ros_gateway.arrivals import Request, come_though_refused, counts, in_order
 from conformance.scenarios.rule import NotTested, Outcome, Rule, rule
 from conformance.verdict.evidence import Case
 
@@ -128,7 +128,7 @@ def _others(
     sent = list(chain.from_iterable(one.sent for one in (*before, batch)))
     known |= {trace.key(message.delivery) for message in sent if message.may_arrive}
     earlier = {trace.key(message.delivery): message for message in chain.from_iterable(map(_accepted_in, before))}
-    not_accepted = refused(_requests(trace, *before, batch), _keys(trace, batch))
+    not_accepted = come_though_refused(_requests(trace, *before, batch), _keys(trace, batch))
     unwanted = {one.key: one.sent for one, came in not_accepted if came and one.key not in known}
     others = [sighting.delivery for sighting in batch.seen if trace.key(sighting.delivery) not in known]
     keys = [trace.key(delivery) for delivery in others]
