@@ -42,9 +42,23 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for results and reports [out]")
     parser.add_argument("--duration", type=float, default=25.0, help="seconds of load [25]")
     options = parser.parse_args()
-    started = time.monotonic()
+    started = time.time()
     # SIGTERM, which ends a CI job, stops the robot too, like Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        code = _run(options)
+    except KeyboardInterrupt:
+        code = int(ExitCode.INTERRUPTED)
+    _summary(options.out, started, interrupted=code == ExitCode.INTERRUPTED)
+    return code
+
+
+def _run(options: argparse.Namespace) -> int:
+    """Run both commands on a robot that runs until then; return the exit code.
+
+    Raises:
+        KeyboardInterrupt: a signal came; the robot is stopped, and the command has written what it had.
+    """
     with own_domain(1) as domain, _robot(domain) as (rest, soap):
         endpoints = [str(_STATEMENT), "--rest", rest, "--publishers-wsdl", soap]
         endpoints += ["--subscribers-wsdl", soap.replace("publisher", "subscriber")]
@@ -54,7 +68,6 @@ def main() -> int:
         certified = _roaas(options.out, "certify", *common, *judged)
         _say("3/3", f"measuring SOAP against REST for {options.duration:g} s")
         loaded = _roaas(options.out, "load", *common, *_MEASURED, "--duration", f"{options.duration:g}")
-    _summary(options.out, time.monotonic() - started)
     return certified or (0 if loaded == ExitCode.INCONCLUSIVE else loaded)
 
 
@@ -89,6 +102,7 @@ def _roaas(out: Path, *arguments: str) -> int:
     with (
         log.open("w", encoding="utf-8") as kept,
         subprocess.Popen(command, env=environment, text=True, errors="replace", **streams) as process,  # noqa: S603 - ours
+        _ending(process),
     ):
         for line in process.stderr or ():
             kept.write(line)
@@ -102,27 +116,46 @@ def _roaas(out: Path, *arguments: str) -> int:
     return process.returncode
 
 
+@contextmanager
+def _ending(process: subprocess.Popen[str]) -> Iterator[None]:
+    """After a signal, let a command write what it has; a second signal kills it."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        process.terminate()
+        try:
+            process.communicate()
+        except KeyboardInterrupt:
+            process.kill()
+        raise
+
+
 def _say(step: str, text: str) -> None:
     print(f"\n== {step} {text}", flush=True)  # noqa: T201 - a demo talks
 
 
-def _summary(out: Path, seconds: float) -> None:
-    """Print the two results, and what to look at."""
-    result, latency = (_read(out / name) for name in ("result.json", "latency.json"))
-    lines = [f"== done in {seconds:.0f} s"]
+def _summary(out: Path, started: float, *, interrupted: bool) -> None:
+    """Print the results that are not older than the start, and what to look at."""
+    result, latency = (_read(out / name, started) for name in ("result.json", "latency.json"))
+    seconds = time.time() - started
+    lines = [f"== interrupted after {seconds:.0f} s; until then:" if interrupted else f"== done in {seconds:.0f} s"]
     if result:
         passed = sum(value == "pass" for value in result["classes"].values())
         lines.append(f"conformance: {result['verdict']}, {passed} of {len(result['classes'])} classes passed")
     if latency:
         lines.append(f"latency: {latency['headline']['sentence']}")
-    pages = [(out / name, what) for name, what in _PAGES.items() if (out / name).exists()]
-    lines += ["", "Look at these in a browser:", *(f"  {path}   {what}" for path, what in pages)]
+    pages = [(out / name, what) for name, what in _PAGES.items() if _is_new(out / name, started)]
+    lines += ["", "Look at these in a browser:", *(f"  {path}   {what}" for path, what in pages)] if pages else []
     lines += ["", "Then judge a device of your own: roaas certify http://DEVICE/openapi.json"]
     print("\n" + "\n".join(lines))  # noqa: T201 - a demo talks
 
 
-def _read(path: Path) -> dict[str, Any]:
-    document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+def _is_new(path: Path, started: float) -> bool:
+    return path.exists() and path.stat().st_mtime >= started
+
+
+def _read(path: Path, started: float) -> dict[str, Any]:
+    document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if _is_new(path, started) else {}
     return document
 
 

@@ -91,7 +91,7 @@ def init_described(path: Path | None, source: str, options: DeviceOptions, *, fo
         write_described_statement(path, found, api, Calls(options.allow, options.never), where, ros)
     except (OSError, ProbeError) as error:
         raise StatementError(str(error)) from error
-    for remark in (*found.elsewhere, *found.remarks, *found.unread):
+    for remark in (*found.elsewhere, *found.remarks, *found.not_called, *found.unread):
         click.echo(inert(remark), err=True)
     click.echo(f"wrote {path}: look it over, then run `roaas certify {path}`")
     return CommandResult(ExitCode.PASSED)

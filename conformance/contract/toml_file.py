@@ -10,6 +10,7 @@ import re
 import sys
 import tomllib
 from collections.abc import Callable
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar
 
@@ -111,7 +112,9 @@ def _wrong_keys(heading: str, value: dict[str, Any], kind: inspect.StructType) -
     known = {field.encode_name: field for field in kind.fields}
     unknown = sorted(set(value) - set(known))
     if unknown:
-        return f"{heading}unknown key {', '.join(map(repr, unknown))}; known are {', '.join(sorted(known))}"
+        near = get_close_matches(unknown[0], known, 1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        return f"{heading}unknown key {', '.join(map(repr, unknown))}; known are {', '.join(sorted(known))}{hint}"
     missing = [name for name, field in known.items() if field.required and name not in value]
     return f"{heading}{', '.join(map(repr, missing))} is missing" if missing else ""
 

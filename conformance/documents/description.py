@@ -21,7 +21,7 @@ from conformance.commandline.device_options import advice
 from conformance.contract.document_text import parsed
 from conformance.documents.description_faults import dead_references, reason, type_faults, without_unreadable
 from conformance.documents.json_schema import Schema, UnresolvedError, target_of
-from conformance.documents.openapi import not_called, with_sent
+from conformance.documents.openapi import not_called, unknown_methods, with_sent
 from conformance.documents.schema_budget import crowd_in, long_text_in
 from conformance.documents.schema_places import DATA, FILES, in_one_version, make_plain
 from conformance.transport.reach import ElsewhereError, Trust, is_same, joined, path_of
@@ -289,6 +289,7 @@ def _description(source: str, load: Load, overlays: Iterable[str], trust: Trust)
         except OverlayError as error:
             raise DescriptionError(f"{overlay}: {error}") from error
     version = str(original.get("openapi") or original.get("swagger") or "")
+    strange = tuple(unknown_methods(document)) if isinstance(document.get("paths"), dict) else ()
     if version.startswith("2."):
         try:
             document = as_openapi_3(document)
@@ -303,11 +304,11 @@ def _description(source: str, load: Load, overlays: Iterable[str], trust: Trust)
         raise DescriptionError(f"{source} cannot be read with its overlays: {excess}")
     broken = dead_references(document)
     document = _without(document, frozenset(broken)) if broken else document
-    uncalled: tuple[str, ...] = ()
+    uncalled = strange
     if version.startswith("2."):
         document = with_sent(document, document, frozenset())
     else:
-        uncalled, document = not_called(document), with_sent(document, document)
+        uncalled, document = (*uncalled, *not_called(document)), with_sent(document, document)
     document, unread = without_unreadable(in_one_version(document), original)
     base_url, remarks = _base_url(source, document, trust)
     references = (*bundle.unresolved, *broken)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
 from typing import Any, Final
@@ -482,6 +482,18 @@ def not_called(document: Schema) -> tuple[str, ...]:
         for method, one in methods_of(whole).items()
         if isinstance(one, dict) and (unwritten := _unwritten(one.get("parameters"), document))
     )
+
+
+def unknown_methods(document: Schema) -> Iterator[str]:
+    """Yield a remark for each operation below a name that is no method of path items (OpenAPI 3.2, 4.9)."""
+    for path, item in document["paths"].items():
+        for name, operation in item.items() if isinstance(item, dict) else ():
+            if name in _METHODS or name.startswith("x-") or not isinstance(operation, dict):
+                continue
+            if "responses" in operation:
+                lower, more = name.lower(), "only OpenAPI 3.2 describes further methods, in additionalOperations"
+                how = f"write {lower!r}" if lower in _METHODS else more
+                yield f"{name.upper()} {path} is not called: {name!r} is no method of OpenAPI; {how}."
 
 
 def _sent_parameters(given: Any, document: Schema, ignored: frozenset[str]) -> list[Any]:

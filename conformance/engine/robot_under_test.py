@@ -7,7 +7,7 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any, Final, TextIO
@@ -259,6 +259,9 @@ class RobotUnderTest:
                     services[name] = open_service(name, wsdl, endpoint, self.connection, path, self.device.messages)
                     self._look(name, services[name].client, services[name].path)
         self._permit_reading(services)
+        for name, service in services.items():
+            with suppress(NoAnswerError):
+                self.run.unreachable |= {name: problem} if (problem := service.mistaken) else {}
         self._services = SoapServices(self.run, services.get(Interface.PUBLISHERS), services.get(Interface.SUBSCRIBERS))
 
     def _permit_reading(self, services: Mapping[Interface, SoapService]) -> None:

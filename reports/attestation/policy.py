@@ -1,10 +1,12 @@
 """Read a policy: a TOML file with what a recipient demands of a signed certificate, one demand per line."""
 
+import difflib
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import msgspec
 
@@ -14,6 +16,9 @@ from reports.given_files import read_octets
 
 _MOST_BYTES = 1 << 20
 _Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
+_Days = Annotated[float, msgspec.Meta(gt=0, le=100_000)]
+_Verdicts = tuple[Literal["conformant", "not-conformant", "inconclusive"], ...]
+_Efforts = tuple[Literal["quick", "standard", "deep"], ...]
 OWN = "installed"
 """In a policy, this word means the suite that verifies."""
 
@@ -65,12 +70,12 @@ class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     vendor: str | None = None
     firmware: str | None = None
     statement: str | None = None
-    verdicts: tuple[str, ...] = ("conformant",)
+    verdicts: _Verdicts = ("conformant",)
     profile: str = "full"
     classes: tuple[str, ...] | None = None
     suites: tuple[str, ...] = (OWN,)
     requirement_sets: tuple[str, ...] = ("1.2",)
-    efforts: tuple[str, ...] = ("standard", "deep")
+    efforts: _Efforts = ("standard", "deep")
     motion: bool = True
     ros: bool = False
     baseline: bool = False
@@ -78,7 +83,7 @@ class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     tested: _Share = 0.4
     operations: _Share = 0.5
     cases: _Share = 0.04
-    max_age_days: Annotated[float, msgspec.Meta(gt=0, le=100_000)] = 365
+    max_age_days: _Days = 365
     nonce: str | None = None
 
 
@@ -88,6 +93,33 @@ OF_DESCRIBED: Final = Policy(
 )
 
 
+# What a value must be, by the type of its key; other keys are a string.
+_WORDS: Final[Mapping[Any, str]] = {
+    bool: "true or false",
+    Literal[False]: "false, as no policy accepts an interrupted run",
+    _Share: "a number from 0 to 1",
+    _Days: "a positive number up to 100000",
+    _Verdicts: "a list of conformant, not-conformant and inconclusive",
+    _Efforts: "a list of quick, standard and deep",
+    tuple[str, ...]: "a list of strings",
+    tuple[str, ...] | None: "a list of strings",
+}
+
+
+def _fault(table: Mapping[str, Any], said: str) -> str:
+    """Return what is wrong with a policy, in words for its author; ``said`` is what msgspec says of it."""
+    for key in table:
+        if key not in Policy.__struct_fields__:
+            near = difflib.get_close_matches(key, Policy.__struct_fields__, 1)
+            hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(Policy.__struct_fields__)}"
+            return f"unknown key {key!r}; {hint}"
+    place = re.search(r"\$\.(\w+)", said)
+    if place is None:
+        return said
+    key = place[1]
+    return f"{key} = {table[key]!r} must be {_WORDS.get(Policy.__annotations__[key], 'a string')}"
+
+
 def read_policy(path: Path, known: Known) -> Policy:
     """Read a policy from a TOML file and return it.
 
@@ -95,12 +127,16 @@ def read_policy(path: Path, known: Known) -> Policy:
         PolicyUnusableError: the file cannot be read, has an unknown field or a wrong value, or names an unknown
             profile.
     """
+    table: dict[str, Any] = {}
     try:
-        policy = msgspec.convert(tomllib.loads(read_octets(path, _MOST_BYTES).decode("utf-8")), Policy)
+        table = tomllib.loads(read_octets(path, _MOST_BYTES).decode("utf-8"))
+        policy = msgspec.convert(table, Policy)
     except ReportError as error:
         raise PolicyUnusableError(error.message) from error
-    except (ValueError, RecursionError) as error:  # no UTF-8, no TOML, or another type
-        raise PolicyUnusableError(f"{path}: {error}") from error
+    except msgspec.ValidationError as error:
+        raise PolicyUnusableError(f"{path}: {_fault(table, str(error))}") from error
+    except (ValueError, RecursionError) as error:
+        raise PolicyUnusableError(f"{path} is no TOML: {error}") from error
     if policy.classes is None and policy.profile not in known.profiles:
         raise PolicyUnusableError(f"{path}: profile = {policy.profile!r} must be one of {', '.join(known.profiles)}")
     return policy

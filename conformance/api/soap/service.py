@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+from conformance.api.soap.envelope import EMPTY
 from conformance.api.soap.published_wsdl import PublishedWsdl, fetch, get, obtain
 from conformance.contract.classes import Interface
 from conformance.documents.wsdl import SoapOperation, Wsdl, WsdlError, describe, is_http, read_file, unread, unusable
@@ -20,6 +22,8 @@ from conformance.transport.reach import Folder, Trust, split
 KnownMessages = Callable[["SoapService", SoapOperation], Iterable[Node]]
 
 MEDIA_TYPE = "text/xml; charset=utf-8"
+#: The statuses of a POST by which nothing takes messages at an address.
+NO_SERVICE = frozenset({404, 405, 501})
 
 
 @dataclass
@@ -118,6 +122,28 @@ class SoapService:
     def description(self) -> Wsdl:
         """Return the description that a client would use: the robot's own if it is usable, else the contract's."""
         return self.own if self.own is not None and not next(unusable(self.own), "") else self.contract
+
+    @cached_property
+    def mistaken(self) -> str:
+        """Why the given WSDL is not that of this service, or an empty text: a robot may serve a WSDL with faults.
+
+        Raises:
+            NoAnswerError: no HTTP response came.
+        """
+        given, names, why = self.published, set[str](), ""
+        with suppress(WsdlError):
+            found = describe(given.document or b"", given.source or "", unread)
+            names = {operation.name for operation in found.operations}
+        if names and self.contract_wsdl_path and not names & {one.name for one in self.contract.operations}:
+            why = f"{given.source} describes another service, with the operations {', '.join(sorted(names)[:3])}"
+        elif not names and given.attempt is not None:
+            # Where only GET is permitted, it has to do.
+            may_post = not self.client.refusal("POST", self.path)
+            sent = self.post(EMPTY) if may_post else self.client.send("GET", self.path)
+            if sent.response.status in (NO_SERVICE if may_post else {404}):
+                got = f"{sent.request.method} {self.endpoint} returned {sent.came}"
+                why = f"GET {given.source} returned {given.attempt.came} and no WSDL, and {got}"
+        return f"{why}; name the WSDL of the {self.name} service with --{self.name}-wsdl" if why else ""
 
     def fetch(self, location: str) -> bytes:
         """Read a document that the robot's WSDL refers to, or the contract's where the robot has none.

@@ -5,6 +5,7 @@ import pytest
 from conformance.api.expectation import expect
 from conformance.api.interfaces import Interfaces
 from conformance.api.soap.envelope import EMPTY
+from conformance.api.soap.service import NO_SERVICE
 from conformance.contract.classes import Interface
 from conformance.transport.exchange import Attempt, NoAnswerError
 from conformance.verdict.evidence import Judge
@@ -47,8 +48,9 @@ def _look(interfaces: Interfaces, name: Interface) -> tuple[str, Attempt | None]
                 return f"no address of the {name} interface", None
             return "", interfaces.rest.client.send("GET", interfaces.rest.path)
         service = interfaces.soap.there.get(name)
-        if service is None:
-            return f"no address of the {name} interface", None
+        problem = service.mistaken if service else f"no address of the {name} interface"
+        if service is None or problem:
+            return problem, service.published.attempt if service else None
         if service.client.refusal("POST", service.path):
             # Any response to GET shows that the address exists; only GET is permitted.
             return "", service.client.send("GET", service.path)
@@ -57,4 +59,4 @@ def _look(interfaces: Interfaces, name: Interface) -> tuple[str, Attempt | None]
         return f"{name}: {none}", none.unanswered
     # Any response shows a handler of POST: a fault, a 4xx for the empty Body, even a server error.
     status = exchange.response.status
-    return (f"status {status} for POST at the {name} interface" if status in {404, 405, 501} else ""), exchange
+    return (f"status {status} for POST at the {name} interface" if status in NO_SERVICE else ""), exchange

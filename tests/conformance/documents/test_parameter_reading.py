@@ -205,3 +205,20 @@ def test_an_operation_whose_query_string_cannot_be_written_is_named_and_not_call
         "GET /t is not called: its query string is application/jsonpath, which the suite does not write.",
     )
     assert read_operations(read.document)[0].never
+
+
+@pytest.mark.parametrize("version", [{"openapi": "3.0.3"}, {"swagger": "2.0"}], ids=str)
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("get", ()),
+        ("x-own", ()),
+        ("PROPFIND", ("PROPFIND /t is not called: 'PROPFIND' is no method of OpenAPI; only OpenAPI 3.2",)),
+        ("lock", ("LOCK /t is not called: 'lock' is no method of OpenAPI; only OpenAPI 3.2",)),
+        ("GET", ("GET /t is not called: 'GET' is no method of OpenAPI; write 'get'.",)),
+    ],
+)
+def test_an_operation_below_another_name_than_a_methods_is_told(version, name, said):
+    document = {**version, "info": {}, "paths": {"/t": {name: {"responses": {}}, "parameters": []}}}
+    read = read_description("http://device.invalid/o.json", lambda _: json.dumps(document).encode())
+    assert [remark.partition(" describes")[0] for remark in read.not_called] == [*said]

@@ -5,11 +5,14 @@ import itertools
 import time
 
 import pytest
+from aiohttp import web
+from small_device import constant, small_device
 
 from conformance.contract.classes import Interface
 from conformance.engine import robot_under_test
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.packs.table1.statement import Statement
+from conformance.papers_robot.statement import CONTRACT_DIR
 from conformance.statement.endpoints import Endpoints
 from conformance.transport.client import Connection
 from conformance.transport.exchange import NoAnswer, NoAnswerError
@@ -68,3 +71,50 @@ def test_who_waits_long_is_told_for_what(robot_of, monkeypatch, takes_s, told):
     robot = robot_of(takes_s, progress=progress)
     waits = f"rest: waiting for {robot.run.statement.endpoints.rest}, up to 1 s for each answer\n"
     assert progress.getvalue() == told * waits
+
+
+async def _refused(_):
+    return web.Response(status=500)  # as to an empty Body
+
+
+def _wsdls(publishers, subscribers):
+    """Return a robot with two SOAP services, and with these texts as their WSDLs."""
+
+    def serving(wsdl):
+        async def read(_):
+            return web.Response(text=wsdl, content_type="text/xml")
+
+        return {"GET": read, "POST": _refused}
+
+    return {"/publishers": serving(publishers), "/subscribers": serving(subscribers), "/state": constant({"x": 1})}
+
+
+_ACTS, _READS = ((CONTRACT_DIR / f"{name}.wsdl").read_text(encoding="utf-8") for name in Interface if name != "rest")
+
+
+@pytest.mark.parametrize(
+    ("given", "wsdl", "why"),
+    [
+        ("/subscribers?wsdl", _READS, ""),
+        ("/subscribers?wsdl", _READS.replace("</wsdl:definitions>", ""), ""),
+        ("/publishers?wsdl", _READS, "describes another service, with the operations ExecuteCoffeeRequest"),
+        ("/none?wsdl", _READS, "returned status 404, application/json and no WSDL, and POST"),
+        ("/state", _READS, "returned status 200, application/json and no WSDL, and POST"),
+    ],
+    ids=[
+        "its WSDL",
+        "a WSDL with a fault",
+        "that of the other service",
+        "a path that is not there",
+        "another resource",
+    ],
+)
+def test_a_wrong_wsdl_is_one_finding_that_says_what_to_give(given, wsdl, why):
+    with small_device({}, _wsdls(_ACTS, wsdl)) as url:
+        where = Endpoints(publishers_wsdl=f"{url}/publishers?wsdl", subscribers_wsdl=f"{url}{given}")
+        robot = RobotUnderTest(Run(statement=Statement(endpoints=where), allow_motion=True), Connection(timeout_s=5.0))
+        robot.connect()
+    said = robot.run.unreachable.get(Interface.SUBSCRIBERS, "")
+    assert (why in said, bool(said)) == (True, bool(why)), said
+    assert not why or said.endswith("name the WSDL of the subscribers service with --subscribers-wsdl")
+    assert Interface.PUBLISHERS not in robot.run.unreachable

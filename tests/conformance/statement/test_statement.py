@@ -66,7 +66,7 @@ def test_a_full_statement(tmp_path):
             "[robto]\nname = 'x'",
             "unknown key 'robto'; known are api, auth, calls, claims, endpoints, limits, load, motion, robot, ros",
         ),
-        ("[limts]\nhold_s = 1", "unknown key 'limts'"),
+        ("[limts]\nhold_s = 1", "; did you mean 'limits'?"),
         ("[endpoints]\nrset = 'x'", "[endpoints] unknown key 'rset'; known are api_key,"),
         ("[endpoints]\nrest = 7003", "[endpoints] rest = 7003 must be a string"),
         (

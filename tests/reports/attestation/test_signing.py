@@ -183,7 +183,19 @@ def test_what_cannot_be_read_is_no_verdict(desk, tmp_path):
 
 @pytest.mark.parametrize(
     ("line", "named"),
-    [("effort = 1", "effort"), ("efforts = 1", "efforts"), ("profile = 'all'", "all"), ("x", "policy.toml")],
+    [
+        ("effort = 1", "unknown key 'effort'; did you mean 'efforts'[?]"),
+        ("zzz = 1", "unknown key 'zzz'; known are robot, vendor"),
+        ("efforts = 1", "efforts = 1 must be a list of quick, standard and deep"),
+        ("verdicts = ['conform']", "must be a list of conformant, not-conformant and inconclusive"),
+        ("tested = 40", "tested = 40 must be a number from 0 to 1"),
+        ("motion = 'yes'", "motion = 'yes' must be true or false"),
+        ("robot = 1", "robot = 1 must be a string"),
+        ("suites = [1]", r"suites = \[1\] must be a list of strings"),
+        ("max_age_days = 0", "max_age_days = 0 must be a positive number"),
+        ("profile = 'all'", "all"),
+        ("x", "policy.toml is no TOML"),
+    ],
 )
 def test_a_policy_is_read_strictly(tmp_path, line, named):
     path = tmp_path / "policy.toml"
