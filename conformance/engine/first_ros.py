@@ -21,6 +21,7 @@ from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.engine.commanded import body_schema, parts_of
+from conformance.engine.first_ros_names import named_in_requests, place_of
 from conformance.engine.first_ros_parameters import parameters_of
 from conformance.engine.map_text import inline
 from conformance.observe.clock import WALL_CLOCK
@@ -73,8 +74,8 @@ class Graph(NamedTuple):
     """Contents of the ROS graph: types by name of topic, service and action, and definitions of types.
 
     ``read`` has what operations returned, by label: the document, or the status of what was no success; ``named`` those
-    with values of their parameters, and the ROS names that lists give for them; ``parameters`` those that read or set a
-    node's parameter, and their keys. ``is_named``: the graph is one such
+    with values of their parameters, and the ROS names that lists or requests give for them; ``known`` those that a read
+    showed, and their keys; ``bodies`` what the body says beside the message. ``is_named``: the graph is one such
     name, so that a body without declared fields may hold its messages.
     """
 
@@ -84,7 +85,8 @@ class Graph(NamedTuple):
     definition: Callable[[str], Definition]
     read: dict[str, Any]
     named: dict[str, tuple[Operation, str]]
-    parameters: dict[str, tuple[Operation, dict[str, Any]]]
+    known: dict[str, tuple[Operation, dict[str, Any]]]
+    bodies: dict[str, dict[str, str]]
     is_named: bool = False
 
     def only(self, name: str) -> Graph:
@@ -158,13 +160,8 @@ def ros_proposals(operations: Sequence[Operation], domain_id: int, client: HttpC
     until = WALL_CLOCK.now() + _READS_S
 
     def get(one: Operation, *, again: bool = False) -> Any:
-        is_new = (
-            (again or one.label not in read)
-            and one.method == "GET"
-            and one.shape is not None
-            and "{" not in one.template
-        )
-        if is_new and WALL_CLOCK.now() < until:
+        is_first = one.label not in read and one.method == "GET" and one.shape is not None and "{" not in one.template
+        if (again or is_first) and WALL_CLOCK.now() < until:
             # A gateway may subscribe only when a client reads.
             with suppress(NoAnswerError):
                 exchange = client.send("GET", one.template, headers=(("Accept", "*/*"),), timeout_s=_READ_S)
@@ -184,14 +181,29 @@ def ros_proposals(operations: Sequence[Operation], domain_id: int, client: HttpC
             {name: types[name][0] for name in told[kind] if types[name] and not _COMMON.search(name)} for kind in _KINDS
         )
         named = {one.label: (one, name) for one, name in _with_values(operations, ends, get)}
-        parameters = {
+        # A gateway may have found a node only after the first read.
+        again = partial(get, again=True)
+        known = {
             one.label: (one, keys)
-            # A gateway may have found the node only after the first read.
-            for one, keys in parameters_of(operations, robot.tell("parameters")["nodes"], partial(get, again=True))
+            for one, keys in parameters_of(operations, robot.tell("parameters")["nodes"], again)
             if one.label not in named
         }
-        graph = Graph(topics, services, actions, robot.definition, read, named, parameters)
-        every = {one.label: one for one in (*operations, *(one for one, _ in (*named.values(), *parameters.values())))}
+        bodies: dict[str, dict[str, str]] = {}
+        for one, name, body in named_in_requests(
+            operations, dict(zip(_KINDS, (topics, services, actions), strict=True))
+        ):
+            if one.method != "GET" and not told["topics"].get(name, {"subscribers": 1})["subscribers"]:
+                continue
+            if one.method != "GET":
+                named[one.label], bodies[one.label] = (one, name), body
+            elif name in topics and told["topics"][name]["publishers"]:
+                with suppress(ProbeError):  # the message type is not installed
+                    fields = {field for field, _ in robot.definition(topics[name]).fields("")}
+                    at = place_of(again(one), fields)
+                    keys = {"topic": name, "type": topics[name]} | ({"at": at} if at else {})
+                    known |= {one.label: (one, keys)} if at is not None else {}
+        graph = Graph(topics, services, actions, robot.definition, read, named, known, bodies)
+        every = {one.label: one for one in (*operations, *(one for one, _ in (*named.values(), *known.values())))}
         yield from _map_lines([*every.values()], graph, domain_id)
     finally:
         robot.close()
@@ -233,12 +245,12 @@ def _settled_graph(robot: Robot) -> dict[str, Any]:
 
 def _map_lines(operations: Sequence[Operation], graph: Graph, domain_id: int) -> Iterator[str]:
     """Yield the lines of a ROS map; operations that are guesses or do not fit become comments."""
-    found = {label: _Proposal(keys) for label, (_, keys) in graph.parameters.items()}
+    found = {label: _Proposal(keys) for label, (_, keys) in graph.known.items()}
     followers: set[str] = set()
     written: set[str] = set()
     # Topics that the gateway publishes come first: another operation hardly reads one of them.
     for operation in sorted(operations, key=lambda item: item.method == "GET"):
-        if "{" in operation.template or operation.label in graph.parameters:
+        if "{" in operation.template or operation.label in graph.known:
             continue
         there = graph.only(graph.named[operation.label][1]) if operation.label in graph.named else graph
         proposal = (
@@ -247,6 +259,7 @@ def _map_lines(operations: Sequence[Operation], graph: Graph, domain_id: int) ->
             else _lists(operation, there)
         ) or _topic(operation, there, written)
         if proposal:
+            proposal.keys |= {"body": graph.bodies[operation.label]} if graph.bodies.get(operation.label) else {}
             found[operation.label] = proposal
             written |= set() if proposal.guess else {proposal.keys.get("publishes", "")}
     for operation in operations:
@@ -270,7 +283,7 @@ def _map_lines(operations: Sequence[Operation], graph: Graph, domain_id: int) ->
             comment = "# " if proposal.guess else ""
             yield from [f"# A guess: {proposal.guess}"] if proposal.guess else []
             yield f"{comment}{basic_string(operation.label)} = {inline(proposal.keys)}"
-        elif operation.label not in {*followers, *graph.named}:
+        elif operation.label not in {*followers, *graph.named, *(re.split("[?#]", label)[0] for label in found)}:
             label = "".join(char if char.isprintable() else " " for char in operation.label)
             yield f"# {label}: {_why_not(operation, graph)}"
 

@@ -286,21 +286,18 @@ class RosMap(_Forms, frozen=True):
 
     @property
     def calls(self) -> tuple[str, ...]:
-        """The operations that the map names."""
-        return (*self.operations, *(call for one in self.operations.values() for call in followers(one)))
+        """The operations that the map names: what is behind "#" only tells two tables of one operation apart."""
+        own = (call.partition("#")[0] for call in self.operations)
+        return (*dict.fromkeys(own), *(call for one in self.operations.values() for call in followers(one)))
 
     @property
     def describable(self) -> tuple[str, ...]:
         """Return the operations in a form that a description has: without queries. OpenAPI has no WebSocket."""
         found = self.operations.items()
-        sockets = {call for call, one in found if isinstance(one, Reads) and one.stream == "websocket"}
+        sockets = {
+            call.partition("#")[0] for call, one in found if isinstance(one, Reads) and one.stream == "websocket"
+        }
         return tuple(call.partition("?")[0] for call in self.calls if call not in sockets)
-
-    @property
-    def acts(self) -> tuple[str, ...]:
-        """The operations that send something to the robot."""
-        found = self.operations.items()
-        return tuple(call for call, one in found if isinstance(one, Publishes | Calls | Acts) or is_setter(call, one))
 
 
 class _Rosbridge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

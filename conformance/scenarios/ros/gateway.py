@@ -217,7 +217,7 @@ class Gateway:
             definition = definition or self.definition(body.type + _PARTS.get(type(body), ""))
             document = document_for(value, definition, body, self.ros)
             values = {**parameters_for(value, body), **values}
-        return self.binding.make(fill(call, values), document)
+        return self.binding.make(fill(call.partition("#")[0], values), document)
 
     def send_texts(self, call: str, body: Body) -> None:
         """Send an invalid request, if JSON makes one: a gateway that refuses it may treat the next one otherwise."""

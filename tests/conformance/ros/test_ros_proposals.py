@@ -11,8 +11,9 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 from gateway_processes import gateway
 from processes import ended
+from toy_server import serving
 
-from ros_probe.process import RosProcess
+from ros_probe.process import ProbeError, RosProcess
 
 #: What no description says.
 UNSAID = ("max_age_s", "rejected", "refused", "timeout_s")
@@ -195,6 +196,88 @@ def test_names_that_differ_are_mapped_and_a_run_with_the_map_passes(tmp_path, do
         "# GET /places/{id}: its path has a parameter: write an operation for each value",
     ):
         assert line in text
+    verdicts = {
+        one["id"]: one["verdict"] for one in json.loads((tmp_path / "out" / "result.json").read_text())["requirements"]
+    }
+    assert {verdicts[one] for one in selected} == {"pass"}, done.stdout
+
+
+WORD = {"type": "string"}
+TOLD = {
+    "/data": ("get", {"parameters": [{"name": "topic", "in": "query", "required": True, "schema": WORD}]}),
+    "/publish": ("post", {"topic": WORD, "type": WORD, "msg": OBJECT}),
+    "/services/call": ("post", {"name": WORD, "args": OBJECT}),
+}
+SAID = {"topic": "/robot1/say", "type": "std_msgs/msg/String"}
+TURN = {"topic": "/robot1/turn", "type": "std_msgs/msg/Float64"}
+
+
+class _Told:
+    """A gateway that is told the ROS name by a query or a body."""
+
+    def __init__(self, domain_id):
+        self.ros, self.last, self.lock = RosProcess("gateway", domain_id=domain_id), {}, threading.Lock()
+        self.ros.await_ready()
+
+    def answer(self, method, path, content):
+        if path == "/openapi.json":
+            return 200, {"openapi": "3.1.0", "info": {"title": "x", "version": "1"}, "paths": self.paths()}
+        with self.lock:
+            return self.read(path.partition("?topic=")[2]) if method == "GET" else self.write(content)
+
+    @staticmethod
+    def paths():
+        found = {}
+        for path, (method, said) in TOLD.items():
+            body = {"content": {"application/json": {"schema": {"type": "object", "properties": said}}}}
+            found[path] = {method: {"responses": {"200": {"description": "done"}}}}
+            found[path][method] |= said if method == "get" else {"requestBody": body | {"required": True}}
+        return found
+
+    def read(self, topic):
+        graph = self.ros.tell("graph")["topics"]
+        if topic not in graph:
+            return 404, {}
+        self.ros.tell("listen", topic=topic, type=graph[topic]["types"][0])
+        for *_, value in self.ros.tell("heard", name=topic, count=not self.last.get(topic), within_s=2.0)["events"]:
+            self.last[topic] = value
+        return (200, {"name": topic, "message": self.last[topic]}) if self.last.get(topic) else (404, {})
+
+    def write(self, content):
+        try:
+            said = json.loads(content)
+            kinds = {str} if said["type"] == SAID["type"] else {int, float}
+            if said["msg"].keys() != {"data"} or type(said["msg"]["data"]) not in kinds:
+                return 422, {}
+            self.ros.tell("publish", topic=said["topic"], type=said["type"], values=[said["msg"]])
+        except (ValueError, LookupError, TypeError, AttributeError, ProbeError):
+            return 422, {}
+        return 200, {}
+
+
+def test_a_name_in_a_query_or_a_body_is_written_out_and_a_run_with_the_map_passes(tmp_path, domain_id):
+    robot, told = RosProcess("robot", domain_id=domain_id), _Told(domain_id)
+    robot.await_ready()
+    robot.tell("publish", topic="/robot1/state", type=SAID["type"], values=[{"data": "ok"}], repeat_s=0.1)
+    robot.tell("listen", **SAID)
+    robot.tell("listen", **TURN)
+    robot.tell("serve", service="/robot1/enable", type="std_srvs/srv/SetBool", script=[])
+    with closing(told.ros), serving(told.answer) as url:
+        with closing(robot):
+            path, found = _proposed(f"{url}/openapi.json", tmp_path, domain_id)
+        tables = found["ros"]["operations"]
+        assert tables == {
+            "GET /data?topic=/robot1/state": {"topic": "/robot1/state", "type": SAID["type"], "at": "/message"},
+            **{
+                f"POST /publish#{one['topic']}": {"publishes": one["topic"], "type": one["type"], "at": "/msg"}
+                | {"body": one}
+                for one in (SAID, TURN)
+            },
+        }
+        selected = [f"ros-gateway/{one}" for one in ("read-exact", "write-exact", "once")]
+        options = ["--ros-play", "--effort", "quick", "--out", tmp_path / "out"]
+        options += [word for one in selected for word in ("--select", one)]
+        done = ended(sys.executable, "-m", "roaas", "certify", path, *options)
     verdicts = {
         one["id"]: one["verdict"] for one in json.loads((tmp_path / "out" / "result.json").read_text())["requirements"]
     }
