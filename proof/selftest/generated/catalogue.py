@@ -7,15 +7,21 @@ from functools import cache
 from typing import Any
 
 from conformance.contract.pack import Contract
-from proof.mutation.messages import Change, Forward, Request, Response
+from proof.mutation.messages import Change, Request
 from proof.mutation.self_test import OpenPlace, self_test_of
 from proof.selftest.generated import responses
 from proof.selftest.generated.described import described_mutants
-from proof.selftest.generated.mutant import MODES, GeneratedMutant, Tally, classes_of_answers, of_answer, of_request
+from proof.selftest.generated.mutant import (
+    MODES,
+    GeneratedMutant,
+    Tally,
+    altering_requests,
+    classes_of_answers,
+    of_answer,
+    of_request,
+)
 from proof.selftest.generated.operators import NUMERIC, OPERATORS, Operator
 from proof.selftest.generated.places import ITEM, Exchange, Place, exchanges, places
-
-_SUCCESS = range(200, 300)
 
 
 def _objects(value: Any, steps: tuple[str, ...]) -> list[dict[str, Any]]:
@@ -29,25 +35,15 @@ def _rewritten(place: Place, edit: Callable[[dict[str, Any], str], bool]) -> Cal
     """Return a change that edits the JSON object that contains the field, before the robot reads the request."""
     *steps, name = place.steps
 
-    def make(tally: Tally) -> Change:
-        def change(request: Request, forward: Forward) -> Response:
-            if not place.exchange.concerns(request):
-                return forward(request)
-            try:
-                value = json.loads(request.body)
-            except (ValueError, RecursionError):
-                return forward(request)
-            altered = [edit(item, name) for item in _objects(value, tuple(steps))]
-            if not any(altered):
-                return forward(request)
-            response = forward(request.copy(body=json.dumps(value).encode()))
-            if response.status in _SUCCESS:
-                tally()
-            return response
+    def alter(request: Request) -> Request | None:
+        try:
+            value = json.loads(request.body) if place.exchange.concerns(request) else None
+        except (ValueError, RecursionError):
+            return None
+        altered = [edit(item, name) for item in _objects(value, tuple(steps))]
+        return request.copy(body=json.dumps(value).encode()) if any(altered) else None
 
-        return change
-
-    return make
+    return altering_requests(alter)
 
 
 _DEFAULTS: dict[str, Any] = {"number": 0.0, "integer": 0, "boolean": False}
@@ -87,14 +83,9 @@ def of_lenience(place: Place, known: frozenset[str]) -> Iterator[GeneratedMutant
     if place.kind == "array" or not place.required or ITEM in place.steps:
         return
     for operator, edit in edits.items():
-        yield GeneratedMutant(
-            f"{operator}:{place.exchange.name}:{place.label}:json",
-            f"{place.exchange.name} takes a {place.label} that it must refuse ({operator}).",
-            operator,
-            place.exchange,
-            ("strict-input",),
-            _rewritten(place, edit),
-        )
+        says = f"{place.exchange.name} takes a {place.label} that it must refuse ({operator})."
+        make = _rewritten(place, edit)
+        yield GeneratedMutant.of(operator, place.exchange, f"{place.label}:json", says, make, ("strict-input",))
 
 
 _NULL = next(operator for operator in OPERATORS if operator.name == "null")
@@ -163,14 +154,9 @@ def _of_fields(contract: Contract) -> Iterator[GeneratedMutant]:
 def _at(operator: Operator, place: Place, mode: str = "") -> GeneratedMutant:
     name = f"{operator.name}@{mode}" if mode else operator.name
     when = f", {MODES[mode]}" if mode else ""
-    return GeneratedMutant(
-        f"{name}:{place.exchange.name}:{place.label}:{place.medium}",
-        f"{place.label} of {place.exchange.name} ({place.medium}) {operator.says}{when}.",
-        name,
-        place.exchange,
-        _classes(place),
-        of_answer(operator, place, mode) if place.part == "answer" else of_request(operator, place),
-    )
+    says = f"{place.label} of {place.exchange.name} ({place.medium}) {operator.says}{when}."
+    make = of_answer(operator, place, mode) if place.part == "answer" else of_request(operator, place)
+    return GeneratedMutant.of(name, place.exchange, f"{place.label}:{place.medium}", says, make, _classes(place))
 
 
 def _classes(place: Place) -> tuple[str, ...]:
@@ -200,14 +186,8 @@ def _of_exchanges(contract: Contract) -> Iterator[GeneratedMutant]:
 
 def _whole(exchange: Exchange, what: str, mode: str, when: str, make: responses.Whole) -> GeneratedMutant:
     name = f"{what}@{mode}" if mode else what
-    return GeneratedMutant(
-        f"{name}:{exchange.name}:answer",
-        f"{exchange.name}'s answer is {what}, {when}.",
-        name,
-        exchange,
-        classes_of_answers(exchange),
-        make(exchange, mode),
-    )
+    says, classes = f"{exchange.name}'s answer is {what}, {when}.", classes_of_answers(exchange)
+    return GeneratedMutant.of(name, exchange, "answer", says, make(exchange, mode), classes)
 
 
 def open_places(contract: Contract) -> tuple[OpenPlace, ...]:

@@ -71,8 +71,7 @@ def _of_operation(operation: Operation, exchange: Exchange) -> Iterator[Generate
 def _mutant(
     operator: str, exchange: Exchange, place: str, says: str, make: Callable[[Tally], Change]
 ) -> GeneratedMutant:
-    return GeneratedMutant(f"{operator}:{exchange.name}:{place}", f"{exchange.name}: {says}.", operator, exchange,
-                           exchange.classes, make)  # fmt: skip
+    return GeneratedMutant.of(operator, exchange, place, f"{exchange.name}: {says}.", make)
 
 
 def _breaching(operation: Operation, exchange: Exchange, alter: Alter, mode: str = "") -> Callable[[Tally], Change]:
@@ -172,13 +171,8 @@ def _of_bodies(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMu
                 altered.body = edit(altered.body)
                 return altered if response.status in within and is_json(response.media_type) else None
 
-            yield _mutant(
-                name,
-                exchange,
-                kind,
-                f"the body of an {kind} is altered ({name})",
-                _breaching(operation, exchange, alter),
-            )
+            make = _breaching(operation, exchange, alter)
+            yield _mutant(name, exchange, kind, f"the body of an {kind} is altered ({name})", make)
 
 
 def _whole(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
@@ -189,13 +183,8 @@ def _whole(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant
         yield _mutant(f"failing{suffix}", exchange, "answer", f"fails with 500, {when}", fail)
         half = _breaching(operation, exchange, _halve, mode)
         yield _mutant(f"cut{suffix}", exchange, "answer", f"sends half of the body, {when}", half)
-        yield _mutant(
-            f"hang-up{suffix}",
-            exchange,
-            "answer",
-            f"closes the connection, {when}",
-            failures.hanging_up(exchange, mode),
-        )
+        lost = failures.hanging_up(exchange, mode)
+        yield _mutant(f"hang-up{suffix}", exchange, "answer", f"closes the connection, {when}", lost)
         cross = cross_responses(exchange, mode, lambda answer: breaks(operation, answer))
         yield _mutant(f"crossed{suffix}", exchange, "answer", f"sends the answer before, {when}", cross)
     yield _mutant("hang", exchange, "answer", "does not answer", failures.hanging(exchange))

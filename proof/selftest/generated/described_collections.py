@@ -162,14 +162,12 @@ def of_lists(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMuta
     ]
     for operator, parameter, differs in rows:
         if parameter is not None:
-            name = f"{operator}:{exchange.name}:query.{parameter.name}"
             says = f"{exchange.name} answers as if {parameter.name} was not sent."
             make = _ignoring(exchange, parameter, differs)
-            yield GeneratedMutant(name, says, operator, exchange, exchange.classes, make)
+            yield GeneratedMutant.of(operator, exchange, f"query.{parameter.name}", says, make)
     if _tells_total(operation.shape or {}):
         says = f"{exchange.name} tells one item too many after {_RIGHT} lists."
-        name, make = f"total-later:{exchange.name}:answer", _counting(exchange)
-        yield GeneratedMutant(name, says, "total-later", exchange, exchange.classes, make)
+        yield GeneratedMutant.of("total-later", exchange, "answer", says, _counting(exchange))
 
 
 def _tells_total(schema: Schema, depth: int = 0) -> bool:
@@ -262,8 +260,8 @@ def of_things(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMut
     if operation.method in {"PUT", "PATCH"} and any(map(is_json, operation.bodies)):
         rows.append(("applies-refused", "writes what it refuses with 415", lambda: _applying))
     for operator, says, begin in rows if collection_of(operation.template) else ():
-        name, make = f"{operator}:{exchange.name}:item", _after(exchange, operation, begin)
-        yield GeneratedMutant(name, f"{exchange.name} {says}.", operator, exchange, exchange.classes, make)
+        make = _after(exchange, operation, begin)
+        yield GeneratedMutant.of(operator, exchange, "item", f"{exchange.name} {says}.", make)
 
 
 def _after(exchange: Exchange, operation: Operation, begin: Callable[[], _Act]) -> Callable[[Tally], Change]:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 
 from conformance.documents.openapi import Operation
 from proof.mutation.messages import Change, Forward, HangUpError, Request, Response
-from proof.selftest.generated.mutant import GeneratedMutant, Mode, Tally
+from proof.selftest.generated.mutant import SUCCESS, Alter, GeneratedMutant, Tally, altering_requests, in_mode
 from proof.selftest.generated.places import Exchange
 
 _BAD_REQUEST = 400
@@ -19,7 +19,6 @@ _TRACEBACK = json.dumps(
     'Traceback (most recent call last):\n  File "/srv/device/app/handlers.py", line 83, in handle\n    '
     "value = table[key]\nKeyError: 'speed'\n"
 ).encode()
-Edit = Callable[[Request, Response], Response | None]
 
 
 def make_failed(answer: Response) -> None:
@@ -31,25 +30,10 @@ def make_failed(answer: Response) -> None:
 def hanging_up(exchange: Exchange, mode_name: str) -> Callable[[Tally], Change]:
     """Return a change that closes the connection in place of a successful response, in a mode."""
 
-    def make(tally: Tally) -> Change:
-        mode = Mode(mode_name)
+    def alter(request: Request, answer: Response) -> Response | None:
+        return answer if exchange.concerns(request) and answer.status in SUCCESS else None
 
-        def change(request: Request, forward: Forward) -> Response:
-            together = mode.begin()
-            response: Response | None = None
-            try:
-                response = forward(request)
-                fits = exchange.concerns(request) and response.status in _SUCCESS
-                if fits and mode.strikes(together=together):
-                    tally()
-                    raise HangUpError
-                return response
-            finally:
-                mode.end(response)
-
-        return change
-
-    return make
+    return in_mode(mode_name, alter, hangs_up=True)
 
 
 def hanging(exchange: Exchange) -> Callable[[Tally], Change]:
@@ -101,24 +85,12 @@ def showing_insides(exchange: Exchange) -> Callable[[Tally], Change]:
     return edit_responses(exchange.concerns, edit)
 
 
-def edit_responses(where: Callable[[Request], bool], edit: Edit) -> Callable[[Tally], Change]:
+def edit_responses(where: Callable[[Request], bool], edit: Alter) -> Callable[[Tally], Change]:
     """Return a change that edits responses to some requests; ``edit`` returns None to leave one as it is."""
-
-    def make(tally: Tally) -> Change:
-        def change(request: Request, forward: Forward) -> Response:
-            response = forward(request)
-            altered = edit(request, response) if where(request) else None
-            if altered is None:
-                return response
-            tally()
-            return altered
-
-        return change
-
-    return make
+    return in_mode("", lambda request, answer: edit(request, answer) if where(request) else None)
 
 
-_SUCCESS, _METHOD_NOT_ALLOWED = range(200, 300), 405
+_METHOD_NOT_ALLOWED = 405
 # Difference of a wrong Content-Length, bytes.
 _OFF = 7
 
@@ -132,7 +104,7 @@ def of_http(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutan
     def at(*methods: str) -> Callable[[Request], bool]:
         return lambda request: resource(request) and request.method in methods
 
-    rows: list[tuple[str, str, Callable[[Request], bool], Edit]] = [
+    rows: list[tuple[str, str, Callable[[Request], bool], Alter]] = [
         (name, says, exchange.concerns, edit) for name, (says, edit) in _ANSWERS.items()
     ]
     if operation.method == "GET":
@@ -144,17 +116,11 @@ def of_http(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutan
     rows.append(("unknown-fails", "answers a method that nobody knows with 500", _unknown(resource), _failing))
     rows.append(("options-fails", "answers OPTIONS with 500", at("OPTIONS"), _failing))
     for name, says, where, edit in rows:
-        yield GeneratedMutant(
-            f"{name}:{exchange.name}:http",
-            f"{exchange.name} {says}.",
-            name,
-            exchange,
-            exchange.classes,
-            edit_responses(where, edit),
-        )
+        make = edit_responses(where, edit)
+        yield GeneratedMutant.of(name, exchange, "http", f"{exchange.name} {says}.", make)
 
 
-def _edit_of(change: Callable[[Response], object], when: Callable[[Response], bool]) -> Edit:
+def _edit_of(change: Callable[[Response], object], when: Callable[[Response], bool]) -> Alter:
     def edit(_request: Request, answer: Response) -> Response | None:
         if not when(answer):
             return None
@@ -166,7 +132,7 @@ def _edit_of(change: Callable[[Response], object], when: Callable[[Response], bo
 
 
 def _fine(answer: Response) -> bool:
-    return answer.status in _SUCCESS and answer.method != "HEAD"
+    return answer.status in SUCCESS and answer.method != "HEAD"
 
 
 def _with_body(answer: Response) -> bool:
@@ -214,7 +180,7 @@ def _failing(_request: Request, answer: Response) -> Response | None:
 
 
 # By name: the change of successful responses, with the clause that it breaks.
-_ANSWERS: dict[str, tuple[str, Edit]] = {
+_ANSWERS: dict[str, tuple[str, Alter]] = {
     "no-type": (
         "sends no Content-Type (RFC 9110 8.3)",
         _edit_of(lambda answer: answer.drop("Content-Type"), _with_body),
@@ -300,27 +266,27 @@ _ANSWERS: dict[str, tuple[str, Edit]] = {
     ),
     "unasked-part": (
         "answers 206 where no range was asked for (RFC 9110 15.3.7)",
-        _edit_of(_as_part, lambda answer: answer.status in _SUCCESS and bool(answer.body)),
+        _edit_of(_as_part, lambda answer: answer.status in SUCCESS and bool(answer.body)),
     ),
     "unasked-304": ("answers 304 without a condition (RFC 9110 15.4.5)", _not_modified),
 }
 
 
-_HEADS: dict[str, tuple[str, Edit]] = {
+_HEADS: dict[str, tuple[str, Alter]] = {
     "head-body": (
         "sends a body in response to HEAD (RFC 9110 9.3.2)",
         _edit_of(
             lambda answer: setattr(answer, "raw", answer.octets() + b'{"roaas": 1}'),
-            lambda answer: answer.status in _SUCCESS,
+            lambda answer: answer.status in SUCCESS,
         ),
     ),
     "head-type": (
         "sends another Content-Type for HEAD than for GET (RFC 9110 9.3.2)",
-        _edit_of(lambda answer: answer.put("Content-Type", "text/html"), lambda answer: answer.status in _SUCCESS),
+        _edit_of(lambda answer: answer.put("Content-Type", "text/html"), lambda answer: answer.status in SUCCESS),
     ),
     "head-length": (
         "sends another Content-Length for HEAD than for GET (RFC 9110 8.6)",
-        _edit_of(lambda answer: answer.put("Content-Length", "1"), lambda answer: answer.status in _SUCCESS),
+        _edit_of(lambda answer: answer.put("Content-Length", "1"), lambda answer: answer.status in SUCCESS),
     ),
     "head-fails": ("answers HEAD with 500", _failing),
 }
@@ -339,7 +305,7 @@ def _unknown(resource: Callable[[Request], bool]) -> Callable[[Request], bool]:
     )
 
 
-def _allow(edit: Callable[[Response], object]) -> Edit:
+def _allow(edit: Callable[[Response], object]) -> Alter:
     return _edit_of(edit, lambda answer: answer.field("Allow") is not None and answer.status == _METHOD_NOT_ALLOWED)
 
 
@@ -389,9 +355,7 @@ def of_resource(operation: Operation, exchange: Exchange) -> Iterator[GeneratedM
         ignored = _without("If-Match", at(operation.method), lambda _: True)
         rows.append(("match-ignored", "ignores If-Match (RFC 9110 13.1.1)", ignored))
     for name, says, make in rows:
-        yield GeneratedMutant(
-            f"{name}:{exchange.name}:resource", f"{exchange.name} {says}.", name, exchange, exchange.classes, make
-        )
+        yield GeneratedMutant.of(name, exchange, "resource", f"{exchange.name} {says}.", make)
 
 
 def _missing(answer: Response) -> None:
@@ -399,7 +363,7 @@ def _missing(answer: Response) -> None:
 
 
 def _is_success(answer: Response) -> bool:
-    return answer.status in _SUCCESS
+    return answer.status in SUCCESS
 
 
 def _keeping_tags(where: Callable[[Request], bool]) -> Callable[[Tally], Change]:
@@ -424,18 +388,12 @@ def _keeping_tags(where: Callable[[Request], bool]) -> Callable[[Tally], Change]
 def _without(name: str, where: Callable[[Request], bool], when: Callable[[str], bool]) -> Callable[[Tally], Change]:
     """Return a change that takes a condition out of requests, counted where the device answers 2xx."""
 
-    def make(tally: Tally) -> Change:
-        def change(request: Request, forward: Forward) -> Response:
-            value = request.field(name)
-            if value is None or not where(request) or not when(value):
-                return forward(request)
-            without = request.copy()
-            without.drop(name)
-            response = forward(without)
-            if response.status in _SUCCESS:
-                tally()
-            return response
+    def alter(request: Request) -> Request | None:
+        value = request.field(name)
+        if value is None or not where(request) or not when(value):
+            return None
+        altered = request.copy()
+        altered.drop(name)
+        return altered
 
-        return change
-
-    return make
+    return altering_requests(alter)

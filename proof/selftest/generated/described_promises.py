@@ -48,10 +48,7 @@ _Act = Callable[[Request, Forward, _Past], tuple[Response, bool]]
 def of_promises(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
     """Yield mutants of an operation that break a promise of an earlier exchange."""
     for name, says, act in _rows(operation):
-        make = _changing(exchange, act)
-        yield GeneratedMutant(
-            f"{name}:{exchange.name}:promise", f"{exchange.name} {says}.", name, exchange, exchange.classes, make
-        )
+        yield GeneratedMutant.of(name, exchange, "promise", f"{exchange.name} {says}.", _changing(exchange, act))
 
 
 _Row = tuple[str, str, _Act]
@@ -188,12 +185,10 @@ def _without(name: str) -> _Act:
     """Return an act that takes a header field out of requests."""
 
     def act(request: Request, forward: Forward, _: _Past) -> tuple[Response, bool]:
-        if request.field(name) is None:
-            return forward(request), False
-        altered = request.copy()
+        altered, has_it = request.copy(), request.field(name) is not None
         altered.drop(name)
         response = forward(altered)
-        return response, response.status in _SUCCESS
+        return response, has_it and response.status in _SUCCESS
 
     return act
 

@@ -18,7 +18,7 @@ from conformance.documents.json_shape import Kept, validator_of
 from conformance.documents.openapi import Operation, is_json
 from proof.mutation.messages import Change, Forward, Request, Response
 from proof.selftest.generated.described_collections import NOTHING, Input, inputs_of
-from proof.selftest.generated.mutant import GeneratedMutant, Tally
+from proof.selftest.generated.mutant import SUCCESS, GeneratedMutant, Tally, altering_requests
 from proof.selftest.generated.places import Exchange
 
 # Statuses that any HTTP server may send without a declaration (RFC 9110 15, OpenAPI 3.1 4.8.16).
@@ -99,15 +99,13 @@ def breaks(operation: Operation, answer: Response) -> bool:
     return undeclared_status(operation, answer) or undeclared_type(operation, answer) or broken_body(operation, answer)
 
 
-_SUCCESS = range(200, 300)
 _LONG, _BIG = 1000, 10**9
 
 
 def _mutant(
     operator: str, exchange: Exchange, item: Input, says: str, make: Callable[[Tally], Change]
 ) -> GeneratedMutant:
-    name = f"{operator}:{exchange.name}:{item.label}"
-    return GeneratedMutant(name, f"{exchange.name} {says} {item.label}.", operator, exchange, exchange.classes, make)
+    return GeneratedMutant.of(operator, exchange, item.label, f"{exchange.name} {says} {item.label}.", make)
 
 
 # By name of a mutant: the keywords that it ignores. A format is only a remark (JSON Schema 2020-12, Validation 7.2.1).
@@ -164,20 +162,8 @@ def _filling(exchange: Exchange, item: Input, good: Any) -> Callable[[Tally], Ch
 def _forwarding(
     exchange: Exchange, when: Callable[[Request], bool], edit: Callable[[Request], Request]
 ) -> Callable[[Tally], Change]:
-    """Return a change that edits a request, counted where the device takes the edited one."""
-
-    def make(tally: Tally) -> Change:
-        def change(request: Request, forward: Forward) -> Response:
-            if not exchange.concerns(request) or not when(request):
-                return forward(request)
-            response = forward(edit(request))
-            if response.status in _SUCCESS:
-                tally()
-            return response
-
-        return change
-
-    return make
+    """Return a change that edits some requests of an operation."""
+    return altering_requests(lambda request: edit(request) if exchange.concerns(request) and when(request) else None)
 
 
 def strict(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
@@ -271,7 +257,7 @@ def _answering(
             if not exchange.concerns(request) or not when(request):
                 return forward(request)
             response = forward(request)
-            if response.status not in _SUCCESS and not anyway:
+            if response.status not in SUCCESS and not anyway:
                 return response
             tally()
             return answer(response)

@@ -11,7 +11,7 @@ from urllib.parse import parse_qsl, unquote
 
 from lxml import etree
 
-from proof.mutation.messages import Change, Forward, Request, Response
+from proof.mutation.messages import Change, Forward, HangUpError, Request, Response
 from proof.mutation.table import Mutant
 from proof.selftest.generated.operators import Operator
 from proof.selftest.generated.places import Exchange, Place
@@ -20,6 +20,7 @@ from proof.selftest.generated.slots import edit_message
 # RARE: one exchange in so many. ERROR: first status of an error. Modes of a mutant use both too.
 RARE: Final = 20
 ERROR: Final = 400
+SUCCESS: Final = range(200, 300)
 _FROM: Final = 30
 _PAUSE_S: Final = 1.0
 # _SPELL_S: last seconds of each period in which a fault strikes. _OF_S: length of the period, s.
@@ -233,6 +234,19 @@ class GeneratedMutant:
     make: Callable[[Tally], Change]
     always: Self | None = None
 
+    @classmethod
+    def of(
+        cls,
+        operator: str,
+        exchange: Exchange,
+        place: str,
+        says: str,
+        make: Callable[[Tally], Change],
+        classes: tuple[str, ...] = (),
+    ) -> Self:
+        """Return the mutant of a place of an operation; ``classes``: those of the operation if there are none."""
+        return cls(f"{operator}:{exchange.name}:{place}", says, operator, exchange, classes or exchange.classes, make)
+
     @property
     def interface(self) -> str:
         """Return the interface, REST or SOAP."""
@@ -276,8 +290,11 @@ class Mode:
                 self._error = response.status >= ERROR
 
 
-def in_mode(mode_name: str, alter: Alter) -> Callable[[Tally], Change]:
-    """Return a change that alters responses in a mode; ``alter`` returns None for a response it leaves unchanged."""
+def in_mode(mode_name: str, alter: Alter, *, hangs_up: bool = False) -> Callable[[Tally], Change]:
+    """Return a change that alters responses in a mode, or closes the connection in their place.
+
+    ``alter`` returns None for a response that the change leaves as it is.
+    """
 
     def make(tally: Tally) -> Change:
         mode = Mode(mode_name)
@@ -290,6 +307,8 @@ def in_mode(mode_name: str, alter: Alter) -> Callable[[Tally], Change]:
                 altered = alter(request, response)
                 if altered is not None and mode.strikes(together=together):
                     tally()
+                    if hangs_up:
+                        raise HangUpError
                     return altered
                 return response
             finally:
@@ -307,7 +326,7 @@ def of_answer(operator: Operator, place: Place, mode: str = "") -> Callable[[Tal
         edit = operator.make(place)
 
         def alter(request: Request, response: Response) -> Response | None:
-            if not place.exchange.concerns(request) or response.status not in range(200, 300):
+            if not place.exchange.concerns(request) or response.status not in SUCCESS:
                 return None
             altered = response.copy()
             return altered if edit_message(place, altered, edit) else None
@@ -323,14 +342,28 @@ def of_request(operator: Operator, place: Place) -> Callable[[Tally], Change]:
     def make(tally: Tally) -> Change:
         edit = operator.make(place)
 
-        def change(request: Request, forward: Forward) -> Response:
-            if not place.exchange.concerns(request):
-                return forward(request)
+        def alter(request: Request) -> Request | None:
             altered = request.copy()
-            if not edit_message(place, altered, edit):
+            return altered if place.exchange.concerns(request) and edit_message(place, altered, edit) else None
+
+        return altering_requests(alter)(tally)
+
+    return make
+
+
+def altering_requests(alter: Callable[[Request], Request | None]) -> Callable[[Tally], Change]:
+    """Return a change that alters requests, counted where the device accepts the altered one.
+
+    ``alter`` returns None for a request that the change leaves as it is.
+    """
+
+    def make(tally: Tally) -> Change:
+        def change(request: Request, forward: Forward) -> Response:
+            altered = alter(request)
+            if altered is None:
                 return forward(request)
             response = forward(altered)
-            if response.status in range(200, 300):
+            if response.status in SUCCESS:
                 tally()
             return response
 

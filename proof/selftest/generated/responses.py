@@ -43,14 +43,9 @@ def of_statuses(exchange: Exchange) -> Iterator[GeneratedMutant]:
     """Yield mutants that replace each declared status with each of its neighbours."""
     for status in dict.fromkeys((*exchange.statuses, *((500,) if exchange.side == "soap" else (405, 415)))):
         for other in neighbours(exchange, status):
-            yield GeneratedMutant(
-                f"status:{exchange.name}:{status}-{other}",
-                f"{exchange.name} answers {other} in place of {status}.",
-                "status",
-                exchange,
-                classes_of_answers(exchange),
-                in_mode("", answers(exchange, status_is(status), becomes(other))),
-            )
+            says = f"{exchange.name} answers {other} in place of {status}."
+            make = in_mode("", answers(exchange, status_is(status), becomes(other)))
+            yield GeneratedMutant.of("status", exchange, f"{status}-{other}", says, make, classes_of_answers(exchange))
 
 
 def _set(name: str, value: Callable[[str], str]) -> Callable[[Response], None]:
@@ -109,14 +104,9 @@ def of_headers(exchange: Exchange) -> Iterator[GeneratedMutant]:
     """Yield mutants that drop, double or change each header field that the contract names."""
     for field, of, when, edits in _headers(exchange):
         for operator, edit in edits.items():
-            yield GeneratedMutant(
-                f"{operator}:{exchange.name}:{field}{of}",
-                f"{exchange.name}: {field}{of.replace('-', ' ')} is not as it should be ({operator}).",
-                operator,
-                exchange,
-                classes_of_answers(exchange),
-                in_mode("", answers(exchange, when, edit)),
-            )
+            says = f"{exchange.name}: {field}{of.replace('-', ' ')} is not as it should be ({operator})."
+            make = in_mode("", answers(exchange, when, edit))
+            yield GeneratedMutant.of(operator, exchange, f"{field}{of}", says, make, classes_of_answers(exchange))
     if exchange.side == "rest":
         yield from _of_allow(exchange)
 
@@ -144,14 +134,8 @@ def _of_allow(exchange: Exchange) -> Iterator[GeneratedMutant]:
             edit(altered)
             return None if altered.fields == response.fields else altered
 
-        yield GeneratedMutant(
-            f"{operator}:{exchange.name}:Allow",
-            f"Allow of {exchange.name}'s resource is not as it should be ({operator}).",
-            operator,
-            exchange,
-            ("http",),
-            in_mode("", alter),
-        )
+        says = f"Allow of {exchange.name}'s resource is not as it should be ({operator})."
+        yield GeneratedMutant.of(operator, exchange, "Allow", says, in_mode("", alter), ("http",))
 
 
 def _numbers(change: Callable[[float], str]) -> Callable[[bytes], bytes]:
@@ -187,14 +171,9 @@ def of_bodies(exchange: Exchange, *, numbers: bool) -> Iterator[GeneratedMutant]
             def when(answer: Response, media_type: str = media_type) -> bool:
                 return answer.status in _SUCCESS and bool(answer.body) and answer.media_type == media_type
 
-            yield GeneratedMutant(
-                f"{operator}:{exchange.name}:body:{form}",
-                f"{exchange.name}'s body as {media_type} is altered as a whole ({operator}).",
-                operator,
-                exchange,
-                classes,
-                in_mode("", answers(exchange, when, apply)),
-            )
+            says = f"{exchange.name}'s body as {media_type} is altered as a whole ({operator})."
+            make = in_mode("", answers(exchange, when, apply))
+            yield GeneratedMutant.of(operator, exchange, f"body:{form}", says, make, classes)
 
 
 def cross_responses(
