@@ -2,11 +2,11 @@
 
 import asyncio
 import itertools
-import json
 import re
 
 import pytest
 from aiohttp import web
+from exchanges import broken, exchange
 from small_device import (
     REFUSED,
     answers,
@@ -19,9 +19,6 @@ from small_device import (
     reading,
     small_device,
 )
-
-from conformance.checkers.rest import RestCheckers
-from conformance.transport.exchange import Exchange, Request, Response
 
 _BASE = "http://device:8000"
 _JOB = object_of(
@@ -71,18 +68,16 @@ def _do(name, code=200, **told):
 
 
 def _broken(contract, steps):
-    checkers, broken, now = RestCheckers(contract, _BASE), set(), 1000.0
-    for after_s, method, below, status, seen in steps:
-        now += after_s
-        request = Request(method, f"{_BASE}/jobs/1{below}", (("Host", "device:8000"),), b"")
-        body = json.dumps(seen).encode()
-        response = Response(status, (("Content-Type", "application/json"),), body, 1.0, received_s=now)
-        broken |= {one.requirement for one in checkers(Exchange(request, response)) if not one.holds}
-    return broken & {_READ, _STATES, _THERE}
+    moments = itertools.accumulate((after_s for after_s, *_ in steps), initial=1000.0)
+    exchanges = [
+        exchange(method, f"{_BASE}/jobs/1{below}", status, seen, at_s=now)
+        for now, (_, method, below, status, seen) in zip(itertools.islice(moments, 1, None), steps, strict=True)
+    ]
+    return broken(contract, _BASE, exchanges) & {_READ, _STATES, _THERE}
 
 
 @pytest.mark.parametrize(
-    ("steps", "broken"),
+    ("steps", "blamed"),
     [
         ([_get(), _do("cancel"), _get(), _get(4)] * 2, {_STATES}),
         ([_get(), _do("cancel"), _get(), _get(4)], set()),  # once may be chance
@@ -107,12 +102,12 @@ def _broken(contract, steps):
         ([_get(litres=1), _get(litres=2), _do("fill", litres=9), _get(4, litres=2)] * 2, set()),
     ],
 )
-def test_the_effect_of_a_command(contract, steps, broken):
-    assert _broken(contract, steps) == broken
+def test_the_effect_of_a_command(contract, steps, blamed):
+    assert _broken(contract, steps) == blamed
 
 
 @pytest.mark.parametrize(
-    ("steps", "broken"),
+    ("steps", "blamed"),
     [
         (["POST 1", "POST 1", "POST 1"], {_STATES}),
         (["POST 1", "POST 1"], set()),  # once, the first one may have ended by itself
@@ -120,16 +115,14 @@ def test_the_effect_of_a_command(contract, steps, broken):
         (["POST 1", "DELETE", "POST 1", "DELETE", "POST 1"], set()),
     ],
 )
-def test_a_value_that_the_description_of_a_409_calls_taken(contract, steps, broken):
-    checkers, found = RestCheckers(contract, _BASE), set()
+def test_a_value_that_the_description_of_a_409_calls_taken(contract, steps, blamed):
+    exchanges = []
     for number, step in enumerate(steps):
-        method, _, row = step.partition(" ")
-        body = json.dumps({"row": int(row), "label": f"{number}"}).encode() if method == "POST" else b""
-        fields = (("Host", "device:8000"), ("Content-Type", "application/json"))
-        request = Request(method, f"{_BASE}/rows{'' if body else '/1'}", fields if body else fields[:1], body)
-        answer = Response(201 if body else 204, fields[1:] if body else (), body, 1.0, received_s=1000.0 + number)
-        found |= {one.requirement for one in checkers(Exchange(request, answer)) if not one.holds}
-    assert found & {_STATES} == broken
+        method, _, number_of_row = step.partition(" ")
+        row = {"row": int(number_of_row), "label": f"{number}"} if method == "POST" else None
+        at = ("/rows", 201) if row else ("/rows/1", 204)
+        exchanges.append(exchange(method, _BASE + at[0], at[1], row, sent=row, at_s=1000.0 + number))
+    assert broken(contract, _BASE, exchanges) & {_STATES} == blamed
 
 
 _OCTETS, _NOTES = {"type": "string", "format": "binary"}, {"type": "array", "items": {"type": "string", "minLength": 1}}

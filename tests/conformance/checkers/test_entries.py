@@ -1,12 +1,8 @@
 """Entries that only their list shows: what was created, changed or deleted there, and nothing that was refused."""
 
-import json
-
 import pytest
+from exchanges import exchange, failed
 from small_device import REFUSED, answers, contract_of, described
-
-from conformance.checkers.rest import RestCheckers
-from conformance.transport.exchange import Exchange, Request, Response
 
 _BASE = "http://device:8000"
 _NEW = {"type": "object", "properties": {"text": {"type": "string"}, "at": {"type": "string", "format": "date-time"}}}
@@ -60,17 +56,12 @@ def _listed(*ids, total=None, target="/notes?limit=100", **texts):
 
 
 def _broken(contract, steps):
-    checkers, broken = RestCheckers(contract, _BASE), {}
-    for number, (method, target, sent, status, came) in enumerate(steps):
-        kind = (("Content-Type", "application/json"),)
-        body = json.dumps(sent).encode() if sent is not None else b""
-        request = Request(method, _BASE + target, (("Host", "device:8000"), *(kind if body else ())), body)
-        answer = json.dumps(came).encode() if came is not None else b""
-        response = Response(status, kind if answer else (), answer, 1.0, received_s=float(number))
-        for case in checkers(Exchange(request, response)):
-            if not case.holds and case.requirement in {_THERE, _READ, _KEPT, _GONE}:
-                broken[case.requirement] = bool(case.doubt)
-    return broken
+    exchanges = [
+        exchange(method, _BASE + target, status, came, sent=sent, at_s=float(number))
+        for number, (method, target, sent, status, came) in enumerate(steps)
+    ]
+    found = {case.requirement: bool(case.doubt) for case in failed(contract, _BASE, exchanges)}
+    return {id_: found[id_] for id_ in found.keys() & {_THERE, _READ, _KEPT, _GONE}}
 
 
 def _marks(**marks):

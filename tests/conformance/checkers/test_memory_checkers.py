@@ -1,12 +1,11 @@
 """What was written, created or deleted: a device that forgets is blamed, and none whose things change or end."""
 
-import json
-
 import pytest
+from exchanges import exchange, failed
 from small_device import answers, contract_of, described
 
 from conformance.checkers.rest import RestCheckers
-from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
+from conformance.transport.exchange import NoAnswer, Unanswered
 
 BASE = "http://device:8000/api"
 _MEMBERS = {
@@ -404,42 +403,34 @@ def _contract(tmp_path_factory):
 
 
 def _broken(contract, steps):
-    """Return what is broken in exchanges of 10 ms each, one second after each other."""
-    checkers, now, after, broken = RestCheckers(contract, BASE), 1000.0, 1.0, set()
+    """Return what is broken in exchanges one second after each other; a number is another time before the next."""
+    checkers, now, after, found = RestCheckers(contract, BASE), 1000.0, 1.0, set()
     for step in steps:
         if isinstance(step, float):
             after = step
             continue
-        method, path, sent, status, seen = step
         now, after = now + after, 1.0
-        if method == "RAW":
-            checkers.forget(deletes=path == "DELETE")
+        if step[0] == "RAW":
+            checkers.forget(deletes=step[1] == "DELETE")
             continue
-        kind = "application/merge-patch+json" if path.startswith("/notes") else "application/json"
-        fields = [("Host", "device:8000"), *([("Content-Type", kind)] if sent else [])]
-        request = Request(method, BASE + path, tuple(fields), json.dumps(sent).encode() if sent else b"")
-        body = b"" if seen is None or status in {204, 404} else json.dumps(seen).encode()
-        content = (("Content-Type", "application/json"),) if body else ()
-        attempt = (
-            Unanswered(request, NoAnswer.TIMEOUT, "no response")
-            if status is None
-            else Exchange(request, Response(status, content, body, 10.0, received_s=now))
-        )
-        broken |= {case.requirement for case in checkers(attempt) if not case.holds}
-    return broken & {GONE, THERE, READ, DEFAULTS, KEEPS, PATCH, OWN, STATES}
+        attempt = _exchange(step, now)
+        if step[3] is None:
+            attempt = Unanswered(attempt.request, NoAnswer.TIMEOUT, "no response")
+        found |= {case.requirement for case in checkers(attempt) if not case.holds}
+    return found & {GONE, THERE, READ, DEFAULTS, KEEPS, PATCH, OWN, STATES}
+
+
+def _exchange(step, now):
+    method, path, sent, status, seen = step
+    kind = "application/merge-patch+json" if path.startswith("/notes") else "application/json"
+    shown = None if status in {204, 404} else seen
+    return exchange(method, BASE + path, status or 200, shown, sent=sent or None, kind=kind, at_s=float(now))
 
 
 def _doubts(contract, requirement, steps):
     """Return whether the failed cases of a requirement have doubts; steps: second, and the rest as above."""
-    checkers, found = RestCheckers(contract, BASE), set()
-    for now, (method, path, sent, status, seen) in steps:
-        fields = (("Host", "device:8000"), *([("Content-Type", "application/json")] if sent else []))
-        body = json.dumps(seen).encode() if seen and status not in {204, 404} else b""
-        response = Response(status, (("Content-Type", "application/json"),), body, 1.0, received_s=float(now))
-        request = Request(method, BASE + path, fields, json.dumps(sent).encode() if sent else b"")
-        cases = checkers(Exchange(request, response))
-        found |= {bool(case.doubt) for case in cases if case.requirement == requirement and not case.holds}
-    return found
+    cases = failed(contract, BASE, [_exchange(step, now) for now, step in steps])
+    return {bool(case.doubt) for case in cases if case.requirement == requirement}
 
 
 def test_what_is_published_later_is_a_doubt(contract):

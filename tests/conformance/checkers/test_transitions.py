@@ -1,14 +1,11 @@
 """States that a description names, and what a refusal keeps: what the words leave open is not judged."""
 
-import json
-
 import pytest
+from exchanges import broken, exchange
 from small_device import REFUSED, answers, contract_of, described
 
 from conformance.checkers.changes import barred_by, state_member
-from conformance.checkers.rest import RestCheckers
 from conformance.documents.openapi import read_operations
-from conformance.transport.exchange import Exchange, Request, Response
 
 _BASE = "http://device:8000"
 _BELT = {
@@ -60,16 +57,13 @@ def _contract(tmp_path_factory):
 
 
 def _broken(contract, steps):
-    checkers, broken = RestCheckers(contract, _BASE), set()
+    exchanges = []
     for number, (line, *seen) in enumerate(steps):
         method, path, status = line.split()
-        body = json.dumps(dict(zip(("state", "runs", "archived"), seen, strict=False))).encode() if seen else b""
+        shown = dict(zip(("state", "runs", "archived"), seen, strict=False)) or None
         place = f"/{path}" if path.isdecimal() else f"/1{path.removeprefix('.')}"
-        request = Request(method, f"{_BASE}/belts{place}", (("Host", "device:8000"),), b"")
-        kind = (("Content-Type", "application/json"),) if body else ()
-        exchange = Exchange(request, Response(int(status), kind, body, 1.0, received_s=float(number)))
-        broken |= {one.requirement for one in checkers(exchange) if not one.holds}
-    return broken & {_STATES, _KEEPS}
+        exchanges.append(exchange(method, f"{_BASE}/belts{place}", int(status), shown, at_s=float(number)))
+    return broken(contract, _BASE, exchanges) & {_STATES, _KEEPS}
 
 
 def _refused(action, *runs, change=1):

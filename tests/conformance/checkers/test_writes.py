@@ -1,12 +1,8 @@
 """A write between two reads: what it must and must not do, by method and media type; freedoms are not judged."""
 
-import json
-
 import pytest
+from exchanges import broken, exchange, failed
 from small_device import answers, contract_of, described
-
-from conformance.checkers.rest import RestCheckers
-from conformance.transport.exchange import Exchange, Request, Response
 
 BASE = "http://device:8000/api"
 _PARTS = {
@@ -36,6 +32,7 @@ _OK = {
     "4XX": {"description": ""},
 }
 MERGE, STEPS = "application/merge-patch+json", "application/json-patch+json"
+_KINDS = {"/merge": MERGE, "/kept": MERGE, "/needed": MERGE, "/steps": STEPS, "/things/1": MERGE}
 
 
 def _item(kind, schema):
@@ -424,23 +421,16 @@ def _contract(tmp_path_factory):
 
 
 def _broken(contract, steps):
-    checkers, now, broken = RestCheckers(contract, BASE), 1000.0, set()
-    for method, path, sent, status, seen in steps:
-        now += 1.0
-        kinds = (
-            {"/merge": MERGE, "/kept": MERGE, "/needed": MERGE, "/steps": STEPS, "/things/1": MERGE}
-            if method == "PATCH"
-            else {}
+    exchanges = []
+    for now, (method, path, sent, status, seen) in enumerate(steps, 1001):
+        kind = _KINDS.get(path, "application/json") if method == "PATCH" else "application/json"
+        shown, date = seen if status < 300 else None, f"Sun, 01 Mar 2026 00:{now // 60:02}:{now % 60:02} GMT"
+        exchanges.append(
+            exchange(
+                method, BASE + path, status, shown, sent=sent or None, kind=kind, told=[("Date", date)], at_s=float(now)
+            )
         )
-        fields = [("Host", "device:8000"), *([("Content-Type", kinds.get(path, "application/json"))] if sent else [])]
-        body = json.dumps(sent).encode() if sent else b""
-        answer = json.dumps(seen).encode() if seen is not None and status < 300 else b""
-        kind = (("Date", f"Sun, 01 Mar 2026 00:{now // 60:02.0f}:{now % 60:02.0f} GMT"),)
-        kind += (("Content-Type", "application/json"),) if answer else ()
-        request = Request(method, BASE + path, tuple(fields), body)
-        exchange = Exchange(request, Response(status, kind, answer, 10.0, received_s=now))
-        broken |= {one.requirement for one in checkers(exchange) if not one.holds}
-    return {id_ for id_ in broken if id_ in {READ, KEPT, DEFAULTS, PATCH, OWN, STATES}}
+    return broken(contract, BASE, exchanges) & {READ, KEPT, DEFAULTS, PATCH, OWN, STATES}
 
 
 @pytest.mark.parametrize("name", BROKEN)
@@ -473,9 +463,8 @@ def _wrapped(kind, user):
 def _blamed(kind, user, folder):
     document = described({"/it": {"get": {"responses": {"200": answers(_SCHEMAS[kind])}}}}, "3.1.0")
     contract = contract_of(folder, document)
-    response = Response(200, (("Content-Type", "application/json"),), json.dumps(_wrapped(kind, user)).encode(), 1.0)
-    cases = RestCheckers(contract, _BASE)(Exchange(Request("GET", f"{_BASE}/it", (), b""), response))
-    return [one.observed for one in cases if one.requirement == "description/read-only" and not one.holds]
+    cases = failed(contract, _BASE, [exchange("GET", f"{_BASE}/it", shown=_wrapped(kind, user))])
+    return [one.observed for one in cases if one.requirement == "description/read-only"]
 
 
 @pytest.mark.parametrize("kind", _SCHEMAS)
