@@ -42,12 +42,12 @@ _WHILE: Final = re.compile(
 )
 # What cannot be done to a thing in some state, as in "A job that has finished cannot be cancelled".
 _CANNOT: Final = re.compile(r"([^.;:]*?)\b(?:cannot|can not|can no longer|must not|may not) be\b", re.IGNORECASE)
-# The one state in which something is done, as in "only a queued mission can be started" or "not queued". Below: words
-# with what is needed.
+# The only state in which an operation is accepted, as in "only a queued mission can be started" or "not queued".
 _ONLY: Final = re.compile(
     r"(?:\bonly (?:an? |the |for |if |when |while |it is |allowed |possible )*|^not )`?([\w-]+)(?!.*(?:,| or ))",
     re.IGNORECASE,
 )
+# Words before a condition.
 _NEEDS: Final = re.compile(
     r"\b(?:only|unless|must|ha(?:s|ve) to|needs?|until|before|requires?|should|can|may)\b", re.IGNORECASE
 )

@@ -15,9 +15,8 @@ from conformance.verdict.evidence import Case
 
 _CODING, _ALLOWED = "http/content-coding", "http/accept-encoding"
 _GZIP: Final = frozenset({"gzip", "x-gzip"})
-# _MOST: resources that are remembered. _STEADY: equal uncompressed responses which show that a resource does not
-# change.
-_MOST, _STEADY = 200, 3
+_MOST = 200  # resources that are remembered
+_STEADY = 3  # equal uncompressed responses which show that a resource does not change
 # An element of Accept-Encoding (RFC 9110 12.4.2, 12.5.3).
 _ELEMENT: Final = re.compile(r"\s*([!#$%&'*+.^_`|~\w-]+)\s*(?:;\s*[qQ]=([01](?:\.\d{0,3})?)\s*)?", re.ASCII)
 # Responses that a cache may not store or share, or must revalidate each time.

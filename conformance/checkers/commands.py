@@ -27,8 +27,8 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.verdict.evidence import Case
 
-# How often a command must fail so; once may be by chance. _MOST: things that are remembered.
-_TWICE, _MOST = 2, 1_000
+_TWICE = 2  # failures that count; a single one may be chance
+_MOST = 1_000  # things that are remembered
 # Phrases in a description which say that a command acts later or not always, or that its response shows what was.
 _LATER: Final = re.compile(
     r"\b(?:asynchron\w*|eventual\w*|later|schedul\w*|background|once|when|if|unless|previous(?:ly)?|before|after|request)\b",

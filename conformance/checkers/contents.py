@@ -29,10 +29,10 @@ _HASHES: Final = {"sha-256": hashlib.sha256, "sha-512": hashlib.sha512}
 # Normalised names of members that contain the digest of a file.
 _MEMBERS: Final = {"sha256": hashlib.sha256, "sha512": hashlib.sha512}
 _OCTETS, _TEXT = "application/octet-stream", "text/plain"
-# _MOST: contents that are remembered. _LARGEST: bytes of each.
-_MOST, _LARGEST = 200, 1 << 20
-# _START: octets by which a file of a media type is known. _WITHIN: some of an image's pixels, behind its header.
-_START, _WITHIN = 4, slice(60, 76)
+_MOST = 200  # contents that are remembered
+_LARGEST = 1 << 20  # longest content that is remembered, bytes
+_START = 4  # first bytes of a file, which show its media type
+_WITHIN = slice(60, 76)  # bytes of an image behind its header: pixels
 _RANGE = "http/range"
 _DIGESTS = "description/digest"
 _READ = "description/written-is-read"

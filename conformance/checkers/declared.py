@@ -25,9 +25,9 @@ _ANY_REQUEST = frozenset({401, 429})
 _ODD_REQUEST = frozenset({400, 408, 411, 413, 414, 415, 417, 431})
 # Bodies larger than this are not kept for comparison, octets.
 _LARGE = 1 << 14
-# _JUDGED: responses of an operation that are searched for writeOnly members. _ITEMS: items of each list. _DEEPEST:
-# depth.
-_JUDGED, _ITEMS, _DEEPEST = 40, 20, 5
+_JUDGED = 40  # responses of an operation that are searched for writeOnly members
+_ITEMS = 20  # items of a list that are searched
+_DEEPEST = 5  # levels of a body that are searched
 _OK, _NO_CONTENT, _ERROR, _NOT_FOUND, _NO_METHOD, _NOT_ACCEPTABLE, _SERVER_ERROR = 200, 204, 400, 404, 405, 406, 500
 
 

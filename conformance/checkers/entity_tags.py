@@ -31,8 +31,8 @@ _CONDITIONS: Final = frozenset(
 _TAGS, _MATCH = "description/entity-tag", "description/if-match"
 # Conditions beside If-Match for which a request may also be refused with 412 (RFC 9110 13.2.2).
 _OTHERS: Final = frozenset({"if-none-match", "if-modified-since", "if-unmodified-since"})
-# _MOST: entity tags that are remembered. _LARGEST: bytes of the content of each.
-_MOST, _LARGEST = 4000, 65_536
+_MOST = 4000  # entity tags that are remembered
+_LARGEST = 65_536  # longest content that is remembered with its tag, bytes
 
 
 #: Header fields of a request that choose a representation.

@@ -16,8 +16,8 @@ from conformance.verdict.evidence import SENTENCE, Case
 WELL_FRAMED: Final = "well-framed HTTP"
 # Headers that clients act on, and that several values make meaningless (RFC 9110 5.3).
 _SINGLE = ("Content-Type", "Location", "Retry-After")
-# _TIMES: headers that contain one time and nothing else. _IMF_FIXDATE: grammar of that time (RFC 9110 5.6.7).
-_TIMES = frozenset({"date", "last-modified"})
+_TIMES = frozenset({"date", "last-modified"})  # headers that contain one time and nothing else
+# Grammar of a time in a header (RFC 9110 5.6.7).
 _IMF_FIXDATE = re.compile(
     r"(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun), \d{2} (?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec) \d{4} "
     r"\d{2}:\d{2}:\d{2} GMT",

@@ -24,16 +24,15 @@ from conformance.verdict.evidence import Case
 _IDS: Final = frozenset({"id", "uuid", "guid"})
 # Identifiers of a run that are remembered.
 _REMEMBERED: Final = 50_000
-# _TAKEN: statuses that refuse a creation with a value in use. _FEW: bodies of each path that are kept. Below: bytes
-# of each.
+# Statuses that refuse a creation because a value is in use.
 _TAKEN: Final = frozenset({HTTPStatus.BAD_REQUEST, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY})
-_FEW: Final = 8
-# Phrases in the description of a 409 before and behind a member of which no two things may have the same value.
+_FEW: Final = 8  # bodies that are kept for each path
+# Phrases in the description of a 409, before and after the name of a member that must be unique among all things.
 _SAME: Final = r"\b(?:duplicate|same|existing|taken|(?:with|has) (?:this|that|such an?|its))"
 _HAS: Final = r"\b(?:taken|occupied|in use|(?:already )?exists?|already used|not unique|must be unique)\b"
 # How often a value is taken again before that counts; once, the earlier thing may have ended by itself.
 _TWICE: Final = 2
-_OCTETS: Final = 16_384
+_OCTETS: Final = 16_384  # longest body that is kept, bytes
 
 
 class Identities:

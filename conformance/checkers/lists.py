@@ -32,11 +32,10 @@ from conformance.documents.writing import text_of
 from conformance.transport.exchange import Response
 from conformance.verdict.evidence import SENTENCE, Case
 
-# _REMEMBERED: values of items that are remembered. _ASKED: values of filters. Below: items of a list that are compared.
-_REMEMBERED: Final = 50_000
-_ASKED: Final = 1000
-_COMPARED: Final = 60
-# _LEAST: a list of no more items may be shorter than the least limit to which a device raises others.
+_REMEMBERED: Final = 50_000  # values of items that are remembered
+_ASKED: Final = 1000  # filter values that are remembered
+_COMPARED: Final = 60  # items of a list that are compared with other lists
+# A device may raise small limits to a least one, so a longer list than the limit counts only above this many items.
 _LEAST: Final = 10
 # A server may cut a list at a multiple of this number of items.
 _ROUND: Final = 5
@@ -44,16 +43,17 @@ _ROUND: Final = 5
 _SEEN: Final = 2
 # Kinds of items that a sorted list may have: all items of one kind may come before those of another.
 _KINDS: Final = 2
-#: LEVELS: parameters that ask for a level or higher, as log filters do. _INCLUDING: boolean parameters that ask for
-#: further items when true.
+#: Parameters that ask for a level or higher, as log filters do.
 LEVELS: Final = frozenset({"level", "severity", "loglevel", "priority", "criticality", "rank"})
+#: Boolean parameters that ask for further items when true.
 _INCLUDING: Final = frozenset({"deleted", "archived", "hidden", "removed", "inactive", "expired", "retired", "draft"})
 _ALL: Final = frozenset({"all", "any", "none", "*", "both", "default", "unknown", "other", ""})
 
-# Texts that only the suite sends as a cursor. Below: phrases in a description for values that are refused.
+# Texts that the suite sends as a cursor and no device returns.
 _NO_CURSOR: Final = re.compile(r"roaas|\s|[^ -~]")
+# Phrases in a description which say that a value is refused.
 _REFUSED: Final = re.compile(r"\b4(?:\d\d|xx)\b|\b(?:refus|reject|invalid)", re.IGNORECASE)
-# A link in the field Link with its relation. Below: relations of pages.
+# A link in the header Link, with its relation (RFC 8288).
 _LINK: Final = re.compile(r"""<([^>]*)>[^,<]*?;\s*rel\s*=\s*"?([^";,]+)""", re.IGNORECASE)
 _RELATIONS: Final = {"next": "next", "prev": "prev", "previous": "prev", "first": "first", "last": "last"}
 

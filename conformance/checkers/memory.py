@@ -47,28 +47,26 @@ from conformance.transport.reach import is_same, joined
 from conformance.verdict.evidence import SENTENCE, Case
 
 _REFUSED: Final = range(400, 500)
-# _SEEN: how often a difference must appear before it counts, because other clients or several server processes may
-# cause one.
+# How often a difference must appear before it counts, because other clients or several server processes may cause one.
 _SEEN: Final = 2
 _MOST_PENDING: Final = 20
 _MOST_THINGS: Final = 1_000
 # Characters of a value in a message.
 _SHOWN: Final = 200
-# _FOR_EVER: members that no change of a thing changes. _TELLING: least length of an identifier that two devices do not
-# share by chance.
+# Names of members that keep their value when a thing changes.
 _FOR_EVER: Final = re.compile(r"id|uuid|guid|serial|serialnumber|created(?:at|on|time|date)?|creation(?:time|date)")
-_TELLING: Final = 5
+_TELLING: Final = 5  # an identifier with this many characters is unlikely to be equal by chance
 _READ: Final = "written-is-read"
 _NOTHING: Final[tuple[Any, ...]] = (None, "", 0, False, [], {})
 _GONE: Final = "deleted-is-gone"
-# Phrases in a description which say that an identifier is never used again. Below: phrases for things that outlive
-# another.
+# Phrases in a description which say that an identifier is never used again.
 _NEVER_AGAIN: Final = re.compile(
     r"\b(?:never (?:given|used|assigned|issued)|ids? are given\b[^.]*\bnever)\b[^.]*\b(?:twice|again)\b"
     r"|\b(?:not|never) (?:re-?used|re-?assigned)"
     r"|\bid(?:entifier)?\b[^.]*\b(?:higher|greater|larger) than\b[^.]*\b(?:had|ever|deleted)\b",
     re.IGNORECASE,
 )
+# Words in a description which say that a thing remains when another one is deleted.
 _STAYS: Final = re.compile(
     r"\b(?:not|keeps?|kept|stays?|remains?|without|unless|but|except|survives?)\b", re.IGNORECASE
 )

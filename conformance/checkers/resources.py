@@ -15,9 +15,8 @@ from conformance.verdict.evidence import Case
 
 # Statuses that do not show whether a resource exists; CRASHES are findings of their own.
 _NOT_NOW: Final = frozenset({401, 403, 429, 503}) | CRASHES
-# _NO_HEAD: statuses of a device that does not support HEAD. _NO_RESOURCE: statuses for a resource that does not exist.
-_NO_HEAD: Final = frozenset({404, 405, 501})
-_NO_RESOURCE: Final = frozenset({400, 404, 410, 422})
+_NO_HEAD: Final = frozenset({404, 405, 501})  # statuses of a device that does not support HEAD
+_NO_RESOURCE: Final = frozenset({400, 404, 410, 422})  # statuses for a resource that does not exist
 _GONE: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 # URLs that are remembered.
 _MOST: Final = 4000

@@ -29,8 +29,9 @@ from conformance.documents.openapi import resource_at
 from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
 from conformance.verdict.evidence import Case
 
-# _ANY: checkers of every response. _DOCUMENTS: checkers that need the description's operation.
+# Checkers of every response.
 _ANY: Final = (fields.framing, fields.content_type, fields.once, fields.date, fields.last_modified, fields.formats)
+# Checkers that need the description's operation.
 _DOCUMENTS: Final = (
     fields.json, fields.charset, problem.inside, problem.same_status, problem.form, fields.allow, fields.challenge,
     fields.promised_fields, declared.crash, declared.server_error, declared.status, declared.body, texts.whole,

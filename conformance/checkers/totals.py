@@ -25,9 +25,8 @@ from conformance.verdict.evidence import Case
 
 # Reads in which a total must be wrong.
 _OFTEN: Final = 2
-# _CUTS: multiples at which servers cut a list silently. _FEWEST_CUT: its fewest items, with parameters or none.
-_CUTS: Final = (5, 16)
-_FEWEST_CUT: Final = 10, 20
+_CUTS: Final = (5, 16)  # servers cut lists silently at a multiple of one of these
+_FEWEST_CUT: Final = 10, 20  # fewest items of a cut list: with and without parameters
 # Combinations of filters that are remembered.
 _MOST: Final = 1000
 # Phrases in a description which say that a total counts the filtered items.

@@ -24,19 +24,19 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.verdict.evidence import Case
 
-#: A change after OFTEN refusals, and never between ALONE reads without one, is no chance. _OCTETS, _MOST: size and
-#: number of responses kept.
+#: A value is judged to change by refusals if it changed after OFTEN of them, and never between ALONE other reads.
 OFTEN, ALONE = 3, 2
-_OCTETS, _MOST = 65_536, 1_000
+_OCTETS = 65_536  # longest response that is kept, bytes
+_MOST = 1_000  # responses that are kept
 #: Phrases with which an operation says that a refused request changes nothing.
 KEEPS: Final = re.compile(r"nothing (?:is )?chang|not chang|unchanged|no effect|without effect", re.IGNORECASE)
-# A revision member needs only _TWICE refusals, if it did not change between _MANY reads without one.
+# For a revision member _TWICE refusals are enough, if it did not change between _MANY reads without a refusal.
 _TWICE, _MANY = 2, 12
-# _BODIES: those that are kept for each thing. _TELLING: characters of a value to which a thing does not come by itself.
-_BODIES, _TELLING = 8, 5
-# Paths that lead now to one thing, now to another.
+_BODIES = 8  # bodies that are kept for each thing
+_TELLING = 5  # a value with this many characters is unlikely to appear by chance
+# Parts of a path that refer to different things at different times.
 _ALIASES: Final = frozenset({"active", "current", "default", "first", "last", "latest", "me", "newest", "next", "self"})
-# Members that change when a thing does.
+# Members that change with every change of a thing.
 _REVISION: Final = re.compile(r"(?:revision|version|etag|(?:updated|modified|changed)(?:at|on|time)?)$")
 # Phrases with which a description says that no refused request changes anything.
 _SAID: Final = re.compile(

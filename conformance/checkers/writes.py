@@ -52,10 +52,9 @@ _MOST: Final = 1_000
 _SEEN: Final = 2
 # Whole numbers beyond this are not exact as doubles (RFC 8259 6).
 _EXACT: Final = 2**53
-# Characters of a value to which a device does not come by itself.
-_TELLING: Final = 5
-# Relative differences of doubles. _EQUAL: smaller ones do not count. _CLOSE: larger ones are no rounding.
-_EQUAL, _CLOSE = 1e-14, 0.005
+_TELLING: Final = 5  # a value with this many characters is unlikely to appear by chance
+_EQUAL = 1e-14  # doubles count as equal up to this relative difference
+_CLOSE = 0.005  # a larger relative difference is not caused by rounding
 _ZEROS: Final = re.compile(r"\b0+(?=\d)")
 #: Phrases in a description on members that a PUT leaves out.
 GONE: Final = re.compile(
@@ -74,7 +73,7 @@ _STAYS: Final = re.compile(
 _CHANGED_AT: Final = re.compile(r"(?:last)?(?:updated|modified|changed|edited)(?:at|on|time|date)?")
 _READ, _PATCH, _OWN = (f"description/{name}" for name in ("written-is-read", "patch", "read-only"))
 _KEPT, _DEFAULTS = "description/refused-keeps", "description/defaults"
-# What a right device may do with a value.
+# What a conforming device may do to a value that it stores.
 _COARSE: Final = "it may keep numbers only as finely as it can set or measure them"
 _LINES: Final = "it may end lines of a text in its own way"
 

@@ -31,11 +31,11 @@ _SHOWN_CURL = 2000
 _SHOWN_BLOCKED = 5
 # The word of the pages for the verdict "skip".
 _UNTESTED = "not tested"
-# _IN_FULL: findings of one requirement that are printed in full; each further one gets a line of _LINE characters.
-_IN_FULL = 5
+_IN_FULL = 5  # findings of one requirement that are printed in full; each further one gets a line of _LINE characters
 _LINE = 160
-# _REASON: column of a class's reason. _NARROW: that column on a narrow terminal. _WIDE: columns of a wide terminal.
-_REASON, _NARROW, _WIDE = 46, 4, 100
+_REASON = 46  # column in which the reason of a class begins
+_NARROW = 4  # the same on a narrow terminal
+_WIDE = 100  # columns of a wide terminal
 
 
 def print_summary(outcome: Certification) -> None:

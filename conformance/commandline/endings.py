@@ -14,9 +14,9 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Final
 
-#: PARENT_VARIABLE: environment variable with the id of the process with which the command has to end. _OFTEN_S: how
-#: often that is checked, s.
+#: Environment variable with the id of the process with which the command has to end.
 PARENT_VARIABLE: Final = "ROAAS_PARENT"
+#: Interval at which the command checks whether that process still runs, s.
 _OFTEN_S: Final = 0.2
 _ALWAYS: Final = ("SIGINT", "SIGTERM")
 # Signals that end the process by default. Those of a crash, such as SIGSEGV, and of profilers are left alone.

@@ -7,8 +7,9 @@ import zlib
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
-#: MOST: bytes of a result file. _MOST_NODES: values of its JSON, estimated by commas and brackets.
+#: Longest result file, bytes.
 MOST: Final = 64 * 1024 * 1024
+#: Most JSON values in a result file, estimated by its commas and brackets.
 _MOST_NODES: Final = 5_000_000
 _PIECE: Final = 1024 * 1024
 # Flags for opening: reading a pipe without a writer must not block.

@@ -17,10 +17,8 @@ from typing import Any, Final
 from conformance.commandline.secrecy import SECRETS
 
 LOCK_NAME: Final = ".roaas.lock"
-# _ROOM: a result has some hundred kilobytes; if these bytes cannot be written, it cannot either. _MOST: bytes of
-# the lock file that are read.
-_ROOM: Final = bytes(1 << 18)
-_MOST: Final = 1000
+_ROOM: Final = bytes(1 << 18)  # a result has some hundred kilobytes; if these bytes cannot be written, it cannot either
+_MOST: Final = 1000  # bytes of the lock file that are read, at most
 
 
 class FolderError(Exception):

@@ -31,14 +31,11 @@ _SHORTEST_WORD: Final = 8
 _MOST_KNOWN: Final = 100
 _REMEMBERED: Final = 1000
 _MOST_REMEMBERED: Final = 4096
-# _BEGINNING: where a text is cut, so many first characters of a secret are masked. _LONG: only of secrets of this
-# length.
-_BEGINNING: Final = 8
-_LONG: Final = 12
+_BEGINNING: Final = 8  # a cut text may end in this many first characters of a secret: mask them
+_LONG: Final = 12  # only for secrets that are at least this long
 _CUT: Final = re.compile(r"\Z|[\s\"'`<\\]")
-# _SHORTEST_CUT: fewest characters of a secret before an ellipsis that are recognised.
 _ELLIPSIS: Final = re.compile(r"…+|\.{3,}")
-_SHORTEST_CUT: Final = 4
+_SHORTEST_CUT: Final = 4  # fewest characters of a secret before an ellipsis that are recognised
 _LONGEST_CUT: Final = 256
 # Escapes may be nested: they are undone so many times.
 _DEPTH: Final = 4

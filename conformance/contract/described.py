@@ -34,7 +34,7 @@ SOAP: Final = "soap"
 #: Class for the behaviour of the web server, as opposed to the application's.
 WEB_SERVER: Final = "web-server"
 _CLASSES: Final = ("description", "robustness", "http", WEB_SERVER)
-# _DATA: media types of structured data, in which one value can be written in several formats.
+# Media types of structured data: a device may offer the same value in several of them.
 _DATA: Final = re.compile(r"[/+](?:x-)?(?:json|xml|yaml)\b")
 _NO_NAME: Final = re.compile(r"[^a-z0-9]+")
 

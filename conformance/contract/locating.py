@@ -9,9 +9,9 @@ from types import ModuleType
 
 from conformance.contract.toml_file import TomlFileError
 
-#: ENTRY_POINTS: entry-point group of installed packs. MANIFEST: file in each pack's folder.
+#: Entry-point group of installed packs.
 ENTRY_POINTS = "roaas.packs"
-MANIFEST = "pack.toml"
+MANIFEST = "pack.toml"  # name of the manifest in a pack's folder
 _SUITE = Path(__file__).parents[1]
 _BUILT_IN = _SUITE / "packs"
 #: Folder of the generic suite: classes, ledger and checks for any web API.

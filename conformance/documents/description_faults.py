@@ -296,9 +296,8 @@ def _path_fault(operations: Sequence[Operation]) -> str:
 
 
 _UNREADABLE: Final = (UnresolvedError, AttributeError, TypeError, KeyError, ValueError)
-# _SHOWN: characters of a place in a message. _LINES: lines of a message.
-_SHOWN: Final = 300
-_LINES: Final = 200
+_SHOWN: Final = 300  # most characters of a place in a message
+_LINES: Final = 200  # most lines of a message
 _META: Final = jsonschema_rs.validator_for({"$ref": "https://json-schema.org/draft/2020-12/schema"})
 
 

@@ -9,9 +9,8 @@ from typing import Any, Final
 from urllib.parse import unquote
 
 Schema = dict[str, Any]
-# MOST_NODES: nodes of a schema that are copied. _DEEPEST: references in a chain; deeper ones stay lazy references.
-MOST_NODES: Final = 2_000
-_DEEPEST: Final = 8
+MOST_NODES: Final = 2_000  # nodes of a schema that are copied
+_DEEPEST: Final = 8  # references in a chain; deeper ones stay lazy references
 #: Scheme of lazy references.
 LAZY_SCHEME: Final = "roaas-lazy:"
 _LAZY: Final[list[tuple[Schema, str]]] = []

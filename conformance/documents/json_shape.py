@@ -43,9 +43,10 @@ if TYPE_CHECKING:
     from jsonschema.exceptions import ValidationError
 
 T = TypeVar("T")
-# _KEYWORD: stands for a lazy reference in a schema that is compiled alone. _UNEVALUATED: keywords that need all others.
-_KEYWORD: Final = "roaas-referred"
-_UNEVALUATED: Final = frozenset({"unevaluatedProperties", "unevaluatedItems"})
+_KEYWORD: Final = "roaas-referred"  # stands for a lazy reference in a schema that is compiled alone
+_UNEVALUATED: Final = frozenset(
+    {"unevaluatedProperties", "unevaluatedItems"}
+)  # keywords whose meaning depends on all others
 # A schema with at most this many references is compiled together with the schemas it refers to.
 _MOST_TOGETHER: Final = 30
 # Nodes of all compiled schemas that are kept; each takes nearly 1 kB.

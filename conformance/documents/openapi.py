@@ -34,9 +34,8 @@ from conformance.transport.exchange import sendable
 
 _METHODS = ("get", "put", "post", "delete", "patch", "head", "options", "trace", "query")
 SAFE = frozenset({"GET", "HEAD", "OPTIONS", "TRACE", "QUERY"})
-# _NODES_IN_ALL: values of a document that are copied for all paths together. _FEWEST_NODES: for each path at least.
-_NODES_IN_ALL: Final = 500_000
-_FEWEST_NODES: Final = 100
+_NODES_IN_ALL: Final = 500_000  # values of a document that are copied for all paths together
+_FEWEST_NODES: Final = 100  # values that are copied for each path even then
 
 
 @dataclass(frozen=True)

@@ -28,12 +28,11 @@ _NUMBER: Final = re.compile(r"[+-]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][+-]?\d+)?", re
 _INTEGER: Final = re.compile(r"[+-]?\d+", re.ASCII)
 # Texts that no server reads as a number: the empty text, or a letter where a number has none.
 _NO_NUMBER: Final = re.compile(r"|.*[A-DF-Za-df-z].*|[eE].*", re.DOTALL)
-# _BOOLEANS: texts of booleans. _NEAR_BOOLEANS: texts that some frameworks read as a boolean or null.
-_BOOLEANS: Final = {"true": True, "false": False}
+_BOOLEANS: Final = {"true": True, "false": False}  # texts of booleans
+# Texts that some frameworks read as a boolean or null.
 _NEAR_BOOLEANS: Final = frozenset({"", "1", "0", "yes", "no", "on", "off", "t", "f", "y", "n"})
 _NULLS: Final = frozenset({"", "null"})
-# _BEYOND_EVERY_BOUND: digits of an integer that exceeds every declared bound.
-_BEYOND_EVERY_BOUND: Final = 40
+_BEYOND_EVERY_BOUND: Final = 40  # digits of an integer that exceeds every declared bound
 _SCALARS: Final = frozenset({"string", "number", "integer", "boolean"})
 _ENCODED: Final = re.compile(r"%(?![0-9A-Fa-f]{2})")
 

@@ -21,10 +21,8 @@ from typing import Any, Final
 import jsonschema_rs
 import regress
 
-# _SECONDS: longest time of one match in the worker process. _MOST_STEPS: steps of a match without it (hundredths of a
-# second).
-_SECONDS: Final = 2.0
-_MOST_STEPS: Final = 200_000
+_SECONDS: Final = 2.0  # longest time of one match in the worker process
+_MOST_STEPS: Final = 200_000  # most steps of a match without the worker process (hundredths of a second)
 # Pattern syntax that ECMA-262 and Rust read the same way: literals, groups, quantifiers, classes without brackets or
 # &&.
 _ESCAPE: Final = r"\\[dDwWntrfv\-.^$*+?()\[\]{}|/\\]"
@@ -32,7 +30,7 @@ _CLASS: Final = rf"\[\^?(?:{_ESCAPE}|[^\\\[\]&~\-]|(?<!-)-(?!-))+\]"
 _PLAIN: Final = re.compile(
     rf"(?:{_ESCAPE}|{_CLASS}|[^\\\[\](){{}}*+?|.]|\((?:\?:)?(?![?*+])|\)|\|(?![?*+])|(?<![(|^*+?{{])[*+?]|\{{\d{{1,3}}(?:,\d{{0,3}})?\}}\??)*"
 )
-# _NO_ESCAPE: letters without a meaning after a backslash in ECMA-262, although other dialects know some.
+# Letters without a meaning after a backslash in ECMA-262, although other dialects know some.
 _NO_ESCAPE: Final = frozenset("ACEFGHIJKLMNOQRTUVXYZaeghijlmoqyz")
 _SYNTAX: Final = frozenset("^$\\.*+?()[]{}|/")
 _UNICODE_ONLY: Final = re.compile(r"\\(?:[pP]|u)\{")
@@ -201,9 +199,8 @@ def _matches_in_time(pattern: str, source: str, flags: str, text: str) -> bool:
     return _THE_WORKER.matches(pattern, source, flags, text)
 
 
-# _LAST: code points from here on are not listed when Python lacks a class. _MOST_RANGES: ranges of such a class.
-_LAST: Final = 0x2000
-_MOST_RANGES: Final = 40
+_LAST: Final = 0x2000  # code points from here on are not listed when Python lacks a class
+_MOST_RANGES: Final = 40  # most ranges of a class for which Python has none
 _PYTHON_PART: Final = re.compile(
     r"\\[pP]\{[^}]*\}|\\u\{[0-9a-fA-F]+\}|\\u[dD][89abAB][0-9a-fA-F]{2}\\u[dD][c-fC-F][0-9a-fA-F]{2}"
     r"|\\u[0-9a-fA-F]{4}|\\x[0-9a-fA-F]{2}|\\c[A-Za-z]|\\k<[^>]*>|\(\?<(?![=!])[^>]*>|\\.|\[\^\]|\[\]|\(\?|.",

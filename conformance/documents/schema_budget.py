@@ -17,15 +17,12 @@ _MOST_AT_ONCE: Final = 5_000
 _LARGEST: Final = 1_000_000
 # By keyword: most values. Each value is sent in a request of its own.
 _MOST_VALUES: Final = {"enum": 50_000, "examples": 10_000}
-# _DEEPEST: references in a chain. _MOST_STEPS: how often schemas are visited again.
-_DEEPEST: Final = 60
-_MOST_STEPS: Final = 50_000
-# _LONGEST_PATTERN: characters of a pattern. _MOST_REPEATS: product of nested quantifiers.
-_LONGEST_PATTERN: Final = 20_000
-_MOST_REPEATS: Final = 10_000
-# _MOST_STATES: states of all patterns of a document (50 bytes each in an automaton). _STATES_OF_ONE: of one pattern.
-_MOST_STATES: Final = 3_000_000
-_STATES_OF_ONE: Final = 200_000
+_DEEPEST: Final = 60  # references in a chain
+_MOST_STEPS: Final = 50_000  # how often schemas are visited again
+_LONGEST_PATTERN: Final = 20_000  # characters of a pattern
+_MOST_REPEATS: Final = 10_000  # product of nested quantifiers
+_MOST_STATES: Final = 3_000_000  # states of all patterns of a document (50 bytes each in an automaton)
+_STATES_OF_ONE: Final = 200_000  # states of one pattern
 _PART: Final = re.compile(r"\\.|\[(?:\\.|[^\]\\])*\]|\{(\d{1,9})(?:,(\d{0,9}))?\}|.", re.DOTALL)
 _SCHEMAS: Final = frozenset({"schema", "schemas", "definitions", "example", "value"})
 _SHOWN: Final = 60
@@ -35,9 +32,8 @@ _CROWDS: Final = {
     "links": 1_000, "security": 1_000, "servers": 1_000, "encoding": 1_000, "examples": 10_000,
     "securitySchemes": 1_000,
 }  # fmt: skip
-# _LONGEST_WORD: characters of a name, address or pattern. _FOR_PEOPLE: keywords without this limit.
-_LONGEST_WORD: Final = 100_000
-_FOR_PEOPLE: Final = frozenset({"description", "summary", "title", "$comment"})
+_LONGEST_WORD: Final = 100_000  # characters of a name, address or pattern
+_FOR_PEOPLE: Final = frozenset({"description", "summary", "title", "$comment"})  # keywords without this limit
 _VALUES: Final = frozenset({"example", "examples", "default", "value", "enum", "const", "pattern"})
 _IN_ADDRESSES: Final = frozenset({"parameters", "servers", "headers"})
 # Budget of generators that follow every reference: _MOST_UNROLLED parts, _MOST_BESIDE references deep. They make cases

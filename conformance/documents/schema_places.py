@@ -15,7 +15,7 @@ from urllib.parse import unquote
 from conformance.documents.json_schema import Schema, modern
 from conformance.transport.reach import joined
 
-#: FILES: key below which a description that was merged into one document keeps the contents of other files.
+#: Key below which a description that was merged into one document keeps the contents of other files.
 FILES: Final = "x-roaas-files"
 _ONE: Final = frozenset(
     {

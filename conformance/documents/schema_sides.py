@@ -20,7 +20,7 @@ MANY: Final = ("allOf", "anyOf", "oneOf", "prefixItems")
 NAMED: Final = ("properties", "patternProperties", "dependentSchemas")
 #: Keywords that no validator judges, although they say what a value means.
 OPAQUE: Final = ("contentMediaType", "contentEncoding", "contentSchema", "xml")
-#: UNSENT: schema of a member that is not sent in this direction, which allows any value.
+#: Schema of a member that is not sent in this direction, which allows any value.
 UNSENT: Final[Schema] = {"readOnly": True}
 _PLAIN: Final = frozenset(
     {

@@ -10,7 +10,7 @@ from conformance.documents.openapi import Operation, methods_of, with_methods
 
 #: Where a credential is sent (header, query, cookie), and its name there; header names are in lower case.
 Place = tuple[str, str]
-# _OF_HTTP: schemes with credentials that HTTP knows: Authorization, and 401 with a challenge (RFC 9110 11).
+# Schemes with credentials that HTTP knows: Authorization, and 401 with a challenge (RFC 9110 11).
 _OF_HTTP: Final = frozenset({"http", "oauth2", "openIdConnect"})
 _AUTHORIZATION: Final = ("header", "authorization")
 

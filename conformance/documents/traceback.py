@@ -8,9 +8,8 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, is_xml
 from conformance.transport.exchange import Exchange, Request
 
-# _LOOKED_THROUGH: bytes of a body that are searched. _SHOWN: characters of what was found.
-_LOOKED_THROUGH = 200_000
-_SHOWN = 120
+_LOOKED_THROUGH = 200_000  # bytes of a body that are searched for a traceback
+_SHOWN = 120  # characters of the traceback that a finding shows
 # Differences of a text that a response repeats: JSON escapes, and a full stop after it.
 _ESCAPED = re.compile(r"\\([\\\"/])")
 _END = " .,;:!"

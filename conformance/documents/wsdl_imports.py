@@ -20,9 +20,8 @@ from conformance.documents.xsd_assembly import SchemaDocument, location_of
 Fetch = Callable[[str], bytes]
 # Function that returns the location of a namespace's schema, or an empty text.
 Locate = Callable[[str], str]
-# _MOST: documents that a description may refer to. _HEAD: bytes in which a DOCTYPE is looked for.
-_MOST: Final = 50
-_HEAD: Final = 1000
+_MOST: Final = 50  # documents that a description may refer to
+_HEAD: Final = 1000  # bytes in which a DOCTYPE is looked for
 _SHOWN: Final = 80
 _TITLE: Final = re.compile(rb"<title[^>]*>([^<]*)", re.IGNORECASE)
 

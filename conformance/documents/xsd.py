@@ -186,11 +186,9 @@ _MOST_PARTICLES: Final = 1_000
 _MOST_SQUARES: Final = 20_000_000
 # Particles of a group times its minOccurs: compilers unroll it, in nearly 40 kB for each.
 _MOST_UNROLLED: Final = 10_000
-# _MOST_CHAINED: components in a chain of references, which compilers follow recursively. _LONGEST_PATTERN: characters.
-_MOST_CHAINED: Final = 150
-_LONGEST_PATTERN: Final = 5_000
-# _MOST_OPERATORS: groups, quantifiers and alternatives of one pattern (time grows with their cube); below, of all
-# patterns.
+_MOST_CHAINED: Final = 150  # components in a chain of references, which compilers follow recursively
+_LONGEST_PATTERN: Final = 5_000  # longest pattern, characters
+# Most groups, quantifiers and alternatives of one pattern, and of all. Time grows with the cube of their number.
 _MOST_OPERATORS: Final = 900
 _MOST_OPERATORS_OF_ALL: Final = 20_000
 _OPERATOR: Final = re.compile(r"\\.|\[(?:\\.|[^\]\\])*\]|([(*+?{|])", re.DOTALL)

@@ -262,8 +262,10 @@ def rpc_wrapper(name: str, space: str, parts: Sequence[tuple[str, str]]) -> Sche
     return SchemaDocument(f"rpc:{name}", root, inline=True)
 
 
-#: UNKNOWN: stands for a type that no document declares. LEFT_OUT: has a pattern that Python may take too long for.
-UNKNOWN, LEFT_OUT = "{urn:example:roaas}unknown", "{urn:example:roaas}pattern"
+#: Stands for a type that no document declares.
+UNKNOWN = "{urn:example:roaas}unknown"
+#: Stands for a type whose pattern may take Python too long.
+LEFT_OUT = "{urn:example:roaas}pattern"
 _COMPLEX, _SIMPLE = clark(XSD, "complexType"), clark(XSD, "simpleType")
 
 

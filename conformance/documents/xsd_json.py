@@ -21,7 +21,7 @@ _DEEPEST: Final = 6
 _FORMATS: Final = {
     "dateTime": "date-time", "date": "date", "time": "time", "duration": "duration", "anyURI": "uri",
 }  # fmt: skip
-# Octets that are sent as base64, at most: as many as a type declares, or as any device takes.
+# Most bytes of a base64 value: if its type declares a length, and if it declares none.
 _DECLARED_OCTETS, _ANY_OCTETS = 33_001, 4_354
 # Types whose values have no blank, and a regular expression for such values.
 _TOKENS: Final = frozenset({"NMTOKEN", "NCName", "Name", "ID", "IDREF", "language"})

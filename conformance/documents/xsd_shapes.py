@@ -358,9 +358,8 @@ INTEGERS: Final = frozenset(_INTEGERS.split())
 FLOATS: Final = frozenset({"double", "float"})
 NUMBERS: Final = INTEGERS | FLOATS | {"decimal"}
 STRINGS: Final = frozenset({"string", "normalizedString", "token"})
-# _WIDEST: greatest integer to send where the type has no bound. _LONGEST: characters of a text.
-_WIDEST: Final = 2**31 - 1
-_LONGEST: Final = 1_000_000
+_WIDEST: Final = 2**31 - 1  # greatest integer to send where the type has no bound
+_LONGEST: Final = 1_000_000  # longest text, characters
 # Texts that are no number in XML Schema, although some programming languages accept them.
 NO_NUMBERS: Final = (
     "four",

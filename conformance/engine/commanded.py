@@ -51,8 +51,9 @@ _OPPOSITES: Final = (
     ("forward", "backward"), ("forward", "back"), ("forwards", "backwards"), ("forward", "reverse"), ("ahead", "back"),
     ("up", "down"), ("left", "right"), ("in", "out"), ("ccw", "cw"), ("positive", "negative"), ("plus", "minus"),
 )  # fmt: skip
-# Limits in the words of a description: both of them, or the greatest, each with a unit. _DOUBTS: what may change them.
-_AMOUNT, _UNIT = r"([-+]?\d+(?:\.\d+)?)", r"((?:°|%|[a-z]+)(?:/s(?:ec)?|\s+per\s+second)?)?(?![\w.])"
+# Limits in the words of a description: both of them, or the greatest, each with a unit.
+_AMOUNT = r"([-+]?\d+(?:\.\d+)?)"
+_UNIT = r"((?:°|%|[a-z]+)(?:/s(?:ec)?|\s+per\s+second)?)?(?![\w.])"
 _RANGE: Final = re.compile(
     rf"(?<![\w.]){_AMOUNT}\s*(?:[a-z/%°]+\s*)?(?:\bto\b|\.\.\.?|…)\s*{_AMOUNT}\s*{_UNIT}"
     rf"|\bbetween\s+{_AMOUNT}\s*(?:[a-z/%°]+\s+)?and\s+{_AMOUNT}\s*{_UNIT}|\[\s*{_AMOUNT}\s*,\s*{_AMOUNT}\s*\]\s*{_UNIT}",
@@ -63,6 +64,7 @@ _MOST: Final = re.compile(
     rf"\s*(?:±|\+/-)?\s*{_AMOUNT}\s*{_UNIT}",
     re.IGNORECASE,
 )
+# What may change them.
 _DOUBTS: Final = re.compile(
     r"\b(?:default|recommend|typical|usual|example|e\.g|unless|except|if|when|while|depend|about|approx|above|beyond|may)",
     re.IGNORECASE,
@@ -78,8 +80,10 @@ _WORDS: Final = re.compile(
     re.IGNORECASE,
 )
 _FORMS: Final = ("application/x-www-form-urlencoded", "multipart/form-data")
-# _PART: share of the declared limit at which the robot is driven. Without limits: _TURN rad, _WAY m.
-_PART, _TURN, _WAY = 0.1, 0.1, 0.05
+# Share of the declared limit at which the robot is driven. Without limits, it moves by _TURN rad or _WAY m.
+_PART = 0.1
+_TURN = 0.1
+_WAY = 0.05
 # By unit, how many of them are in one m, or about so many in one rad.
 _IN_UNITS: Final = {"mm": 1000.0, "cm": 100.0, "deg": 50.0}
 

@@ -13,13 +13,15 @@ from conformance.measures.samples import Sample
 from conformance.scenarios.motion.templates import NoValueError, angle_of
 from conformance.statement.motion_map import Angle
 
-# Budget of one document: _DEEP levels, _MANY numbers, _LISTED items of one list.
-_DEEP, _MANY, _LISTED = 8, 400, 24
+# Parts of a document that are searched for numbers:
+_DEEP = 8  # levels
+_MANY = 400  # numbers
+_LISTED = 24  # items of one list
 # Greatest difference of a quaternion's length from 1.
 _UNIT: Final = 0.02
 # No angle of one turn is greater in rad, however it is counted.
 _RAD: Final = 7.0
-#: ANGLE: separates the pointer of a quaternion from the name of an angle.
+#: Separates the pointer of a quaternion from the name of an angle.
 ANGLE: Final = "#"
 # A number that is written as a text, as each is in XML; in JSON, digits alone may be an identifier.
 _NUMBER: Final = re.compile(r"[-+]?\d{1,12}(?:\.\d{0,30})?(?:[eE][-+]?\d{1,2})?")

@@ -56,9 +56,12 @@ _PACE_S: Final = 0.02
 #: How many times a small change of a position is tried at most, where no limits are declared.
 FARTHEST: Final = 10.0
 _MOST_NUMBERS, _MOST_READS = 8, 6
-#: READY_S: how long a device may take to get ready; _AT_ONCE_S: so soon it is ready at once, s. _LONG: no state is a
-# text of so many characters.
-READY_S, _AT_ONCE_S, _LONG = 20.0, 0.3, 40
+#: How long a device may take to get ready, s.
+READY_S = 20.0
+#: A device that is ready within this time counts as ready at once, s.
+_AT_ONCE_S = 0.3
+#: No state is a text of so many characters.
+_LONG = 40
 # Members of a response that say whether the request failed, with what they have if it did not.
 _FAILED: Final = (
     (re.compile(r"/error_?(?:number|code|no)?|/errno", re.IGNORECASE), 0),
@@ -73,13 +76,13 @@ _STOPS: Final = re.compile(
     r"(?:stop|halt|cancel|abort)(?:[-_]?(?:slew|goto|go|mov(?:e|es|ing|ement)|motion|all|ax[ie]s|drives?|robot|now))?",
     re.IGNORECASE,
 )
-# _HELD: what a description says of the end of a velocity, and of the time that it holds. _REPLACES: of a second target.
+# Words of a description which say that a device stops when no further velocity command arrives.
 _HELD: Final = re.compile(
     r"(?=.*\b(?:stop|h[eo]ld|halt|rest|brak|watchdog))(?=.*\b(?:last|no|without)\b.*\b(?:command|twist|velocit|message|rates?\b))",
     re.IGNORECASE | re.DOTALL,
 )
 _TIME: Final = re.compile(r"(\d+(?:\.\d+)?|\bone|\ba) ?(m(?:illi)?)?s(?:ec(?:ond)?s?)?\b", re.IGNORECASE)
-# _OTHERS: what another stop ends than a velocity.
+# Names of things that an operation called "stop" may end instead of a velocity.
 _OTHERS: Final = re.compile(
     r"cancel|abort|mission|program|record|stream|daemon|server|scan|charg|navigat|goal|task|trajector|play",
     re.IGNORECASE,
@@ -87,10 +90,12 @@ _OTHERS: Final = re.compile(
 _REPLACES: Final = re.compile(
     r"\bnew (?:target|goal|move|position)\b[^.;]*\b(?:replace|supersede|preempt|displace|override)s\b", re.IGNORECASE
 )
-#: The robot is kept within ROOM_M of its start, m; a fast robot as near as it can get in ROOM_S, s.
+#: The robot stays within ROOM_M, m, of its start; a fast robot within the way that it drives in ROOM_S, s.
 ROOM_M, ROOM_S = 0.5, 2.5
-#: How fast a device may seem to move at rest, as a share of its fastest. _REST_S: how long it is watched at first, s.
-AT_REST, _REST_S = 0.005, 1.0
+#: How fast a device may seem to move at rest, as a share of its fastest.
+AT_REST = 0.005
+#: How long the device is watched before the first command, s.
+_REST_S = 1.0
 
 
 @dataclass(frozen=True)

@@ -337,8 +337,8 @@ def _stamps(schema: Schema) -> list[str]:
     return found[:1]
 
 
-# _MOST_REASONS: operations without a proposed map that a comment names. _TEMPLATE: a first statement.
-_MOST_REASONS = 20
+_MOST_REASONS = 20  # operations without a proposed map that a comment names, at most
+# A first statement.
 _TEMPLATE = """\
 # Statement on a device that is judged by its own description, and by what binds every web API.
 # Written from the description; look over every line, then: roaas certify {file}

@@ -37,25 +37,23 @@ _PLACES: Final = 50
 _NAMED: Final = 3
 # A message type with fewer fields cannot be recognised by its fields.
 _FEW: Final = 4
-# _READ_S: for one read. _READS_S: for all reads. Below: to discover the graph, and without news until it counts as
-# complete, s.
-_READ_S: Final = 3.0
-_READS_S: Final = 60.0
-_DISCOVERY_S: Final = 15.0
+_READ_S: Final = 3.0  # deadline of one read, s
+_READS_S: Final = 60.0  # time for all reads, s
+_DISCOVERY_S: Final = 15.0  # longest wait for the graph, s
 _SETTLES_S: Final = 1.0
-# _COMMON: names that every ROS node has. _PARAMETER: a parameter of a path.
+# Names that every ROS node has.
 _COMMON: Final = re.compile(r"/(parameter_events|rosout)$|/_|/(get_type_description|\w+_parameters(_atomically)?)$")
-_PARAMETER: Final = re.compile(r"\{[^{}]*\}")
+_PARAMETER: Final = re.compile(r"\{[^{}]*\}")  # a parameter in a path
 _CANCELS: Final = re.compile(r"/[^/]*(cancel|abort|stop|preempt)[^/]*/?$")
 _STATE: Final = re.compile(r"[/_](state|status|phase)$")
 _SENDS: Final = frozenset({"POST", "PUT", "PATCH"})
-# _FAILURES: booleans beside a message, and what they are if it is too old or there is none.
+# Names of booleans beside a message, and their value if the message is too old or missing.
 _FAILURES: Final = {r"/(is_?)?(stale|outdated|expired)$": True, r"/(success|ok)$": False}
 # What the letter before an axis means, as in qw and vx.
 _LETTERS: Final = {"": "position", "q": "orientation", "v": "linear", "w": "angular"}
 _AXIS: Final = re.compile(r"([qvw]?)([xyzw])")
-# _KINDS: ends of the graph. _HOLDS: by part of a goal or call, names of an object without declared fields for it.
-_KINDS: Final = ("topics", "services", "actions")
+_KINDS: Final = ("topics", "services", "actions")  # ends of the graph
+# Names of objects without declared fields, by the part of a goal or call that they contain.
 _HOLDS: Final = {
     "feedback": re.compile(r"/[^/]*(feedback|progress)$"),
     "result": re.compile(r"/[^/]*(result|outcome|output|response|parameters)$"),

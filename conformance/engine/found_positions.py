@@ -24,17 +24,17 @@ from conformance.measures.samples import SEVERAL, Noise, Sample, slope
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange
 
-# _BEFORE_S: how long the device is watched before and after a small move. _MOVES_S: time for the move, s.
-_BEFORE_S, _MOVES_S = 0.25, 3.0
+_BEFORE_S = 0.25  # how long the device is watched before and after a small move
+_MOVES_S = 3.0  # time for a small move, s
 # After this time no further axis is tried, s.
 _BUDGET_S: Final = 16.0
-# _PARTS: shares of a small move that are tried; a device without limits that is there sooner than in about _SEEN_S, s,
-# goes up to FARTHEST of them. _SLOW_S: no farther move is tried of one that needs so long, s.
-# _FOLLOWS: share by which an axis may miss its target or move along.
-_PARTS, _FOLLOWS = (0.2, 1.0), 0.15
-_SEEN_S, _SLOW_S = 1.0, 2.5
-# _SHARES: of axes that move at once, how far each is sent.
-_SHARES: Final = (1.0, -1.0, 0.8, -0.8, 0.6, -0.6, 0.5, -0.5)
+# Shares of a small move that are tried; a device without limits that is there sooner than in about _SEEN_S, s, goes up
+# to FARTHEST of them.
+_PARTS = (0.2, 1.0)
+_FOLLOWS = 0.15  # share of a move by which an axis may miss its target, or move when another axis is commanded
+_SEEN_S = 1.0
+_SLOW_S = 2.5  # an axis whose move takes this long gets no farther target, s
+_SHARES: Final = (1.0, -1.0, 0.8, -0.8, 0.6, -0.6, 0.5, -0.5)  # of axes that move at once, how far each is sent
 # What a reading has beside a position for its least and its greatest value.
 _LIMITS: Final = (
     ("limits/0", "limits/1"),
@@ -46,10 +46,10 @@ _LIMITS: Final = (
 _TOGETHER: Final = 0.5
 # How long a way may take by what a small move took, so that the limits are tried, s.
 _FULL_WAY_S: Final = 5.0
-# _LONGEST_S: how long a device that still moves is watched. _PAUSES_S: how long it may stand on its way, s.
-_LONGEST_S, _PAUSES_S = 12.0, 1.0
-# No angle is limited to so many rad; the status of a move that must wait for another one.
-_RAD, _CONFLICT = 7.0, 409
+_LONGEST_S = 12.0  # how long a device that still moves is watched
+_PAUSES_S = 1.0  # a longer rest ends a move, s
+_RAD = 7.0  # an axis with a greater limit is no angle in rad
+_CONFLICT = 409  # status of a move that must wait for another one
 
 
 @dataclass(frozen=True)

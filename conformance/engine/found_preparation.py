@@ -49,8 +49,8 @@ _WANTS: Final = re.compile(
 )
 _FORBIDDEN: Final = 403
 _LOCKED: Final = frozenset({"423", "428"})
-# How long the suite asks for a lease, s; how often it renews one of which nobody says how long it lasts, s.
-_ASKED_S, _USUAL_S = 30, 2.0
+_ASKED_S = 30  # duration of the lease that the suite requests, s
+_USUAL_S = 2.0  # interval of its renewals if the device does not say how long it lasts, s
 _STRANGER: Final = "roaas"
 _MOST_STEPS: Final = 4
 _OF_STEP: Final = ("send", "body", "read", "at", "shows")

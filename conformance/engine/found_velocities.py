@@ -28,27 +28,24 @@ from conformance.measures.responses import Response, agreement, response_to, res
 from conformance.measures.samples import SEVERAL, Sample, slope
 from conformance.scenarios.scenario import NotPossibleError
 
-# _DRIVEN_S: duration of a drive. _KEPT_S: interval of commands. _BEFORE_S, _AFTER_S: how long the device is watched, s.
-_DRIVEN_S, _KEPT_S, _BEFORE_S, _AFTER_S = 0.7, 0.1, 0.25, 0.6
-# _LET_GO_S: how long at most no command is sent. _SURE_S: how long the device must rest to count as stopped, s.
-_LET_GO_S, _SURE_S = 10.0, 0.5
-# The hold time that a device must have for which none was seen or declared, s; by how much a declared one may be off.
-_DEMANDED_S, _LONGER = 2.0, 1.5
-# _UNITS: by units in one m or one rad, their names.
+_DRIVEN_S = 0.7  # duration of a drive, s
+_KEPT_S = 0.1  # interval of commands during a drive, s
+_BEFORE_S, _AFTER_S = 0.25, 0.6  # how long the device is watched before and after a drive, s
+_LET_GO_S = 10.0  # how long the suite waits at most without a command for the device to stop, s
+_SURE_S = 0.5  # how long the device must rest to count as stopped, s
+_DEMANDED_S = 2.0  # hold time that the device must keep if it neither showed nor declares one, s
+_LONGER = 1.5  # factor by which a declared hold time may be off
+# Names of the units (of length, of angle), by how many of them make one metre or one radian.
 _UNITS: Final = {1.0: ("m", "rad"), 100.0: ("cm", ""), 1000.0: ("mm", ""), math.degrees(1): ("", "deg")}
 _NEAR: Final = 2.0
-# _FULL: share of its velocity with which a device has not begun to stop. _LATE_S: how much later than it began to move
-# it may begin to stop, s.
-_FULL, _LATE_S = 0.8, 0.15
-# Share of the hold time after which a device that was stopped must not drive on any more.
+_FULL = 0.8  # a device that still has this share of its velocity has not begun to stop
+_LATE_S = 0.15  # how much longer than the start of the drive the start of the stop may take, s
+# A device that obeys a stop must stand before this share of the hold time: after that, the hold time may have ended it.
 _STILL_HELD: Final = 0.8
-# How long a device that was stopped is awaited, s.
-_STOPS_S: Final = 4.0
-# _OTHER: rates that differ by more than this factor have different units. _ROOM_RAD: greatest turn.
-_OTHER: Final = 4.0
-_ROOM_RAD: Final = 3.0
-# How far a velocity may be off, as a share of the fastest.
-_OFF, _OFF_WITHOUT_UNIT = 0.15, 0.25
+_STOPS_S: Final = 4.0  # how long the suite waits for the device to stand after a stop, s
+_OTHER: Final = 4.0  # rates that differ by more than this factor have different units
+_ROOM_RAD: Final = 3.0  # greatest turn, rad
+_OFF, _OFF_WITHOUT_UNIT = 0.15, 0.25  # error that a velocity may have, as a share of the fastest one
 _COORDINATES: Final = frozenset("xyz")
 
 

@@ -95,18 +95,15 @@ _SOAP: Final = "soap/answered"
 # Default wait for a lost device, s: _RETURN_S if a supervisor may restart it, _RESTART_S if a command does.
 _RETURN_S: Final = 20.0
 _RESTART_S: Final = 60.0
-# _SENDS: requests to find the smallest fatal one. _LOOKING_S: time for that, s. Below: earlier requests that are sent
-# too.
-_SENDS: Final = 30
-_LOOKING_S: Final = 120.0
-_BEFORE: Final = (1, 3, 7)
+_SENDS: Final = 30  # requests that are sent to find the smallest fatal sequence
+_LOOKING_S: Final = 120.0  # time for the search, s
+_BEFORE: Final = (1, 3, 7)  # numbers of earlier requests that are sent before the last one
 # A device may crash this long after it has answered its last request, s.
 _DYING_S: Final = 0.3
 # A device that is lost more often than this is not awaited again.
 _MOST_LOSSES: Final = 5
-# _NAMED: requests before the last that the finding names. _HANGS: outcomes that mean a hang.
-_NAMED: Final = 5
-_HANGS: Final = frozenset({NoAnswer.TIMEOUT, NoAnswer.GATEWAY_TIMEOUT})
+_NAMED: Final = 5  # requests before the last that the finding names
+_HANGS: Final = frozenset({NoAnswer.TIMEOUT, NoAnswer.GATEWAY_TIMEOUT})  # outcomes that mean a hang
 # Outcomes of a request that may have crashed the device: it was sent.
 _SUSPECT: Final = frozenset({NoAnswer.CLOSED, NoAnswer.TIMEOUT, *OF_GATEWAY.values()})
 

@@ -25,9 +25,8 @@ QUESTIONS: Final[dict[str, tuple[str, ...]]] = {
     "Does it refuse what is beyond its limits?": ("beyond-limits", "refused-still"),
 }
 _BROKEN: Final = frozenset({"fail", "warn"})
-# _DRIVES_ON: a released device that still has this share of its velocity drives on. _LONG: characters of an answer.
-_DRIVES_ON: Final = 0.5
-_LONG: Final = 240
+_DRIVES_ON: Final = 0.5  # a released device that still has this share of its velocity drives on
+_LONG: Final = 240  # longest answer, characters
 _ENDS: Final = "it is sent to positions, and each move ends at its target"
 _NO_LIMITS: Final = "no limits are declared that are refused"
 

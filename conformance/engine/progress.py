@@ -83,8 +83,8 @@ def note_signals(run: Run) -> Iterator[Interruption]:
 
 # A line at least this often, s.
 _OFTEN_S = 2.0
-# _BAR: columns of the bar. _BEFORE_TEXT: columns of the bar with brackets, counts and blanks.
-_BAR, _BEFORE_TEXT = 24, 42
+_BAR = 24  # columns of the bar
+_BEFORE_TEXT = 42  # columns of the bar with brackets, counts and blanks
 # Words for a requirement that is not met, by level; what a robot MAY do is no failure.
 _WORDS = {Level.MUST: "fail", Level.SHOULD: "warn"}
 

@@ -38,7 +38,7 @@ from conformance.verdict.time_limit import TimeLimit
 
 # Longest pause between two requests that is repeated, s: the effect may need the pause.
 _LONGEST_PAUSE_S = 10.0
-# Time for a replay, s: _LEAST_S, plus _EACH_S for each recorded request, and at most _MOST_S.
+# Time limit of a replay, s: _LEAST_S, plus _EACH_S for each recorded request, but no more than _MOST_S.
 _LEAST_S, _EACH_S, _MOST_S = 60.0, 2.0, 1800.0
 _BY_JUDGEMENT = "as in the run"
 _BY_STATUS = "by the status"

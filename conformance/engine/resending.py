@@ -39,9 +39,8 @@ from conformance.verdict.evidence import Case, Judge
 from conformance.verdict.finding import Again, Finding, Sent
 from conformance.verdict.run import Run
 
-# _MOST: bytes of one request in a result, compressed. _MOST_SENT: bytes sent for one finding; below, for all.
-_MOST = 64 * 1024
-_MOST_SENT = 25 * 1024 * 1024
+_MOST = 64 * 1024  # longest request in a result, compressed, bytes
+_MOST_SENT = 25 * 1024 * 1024  # bytes that are sent for one finding
 _MOST_IN_ALL = 4 * _MOST_SENT
 # Grammar of a method and a target (RFC 9110 5.6.2, 5.5; RFC 9112 3.2): another request cannot hide in them.
 _TOKEN = re.compile(r"[!#$%&'*+.^_`|~0-9A-Za-z-]+")
@@ -49,10 +48,8 @@ _TARGET = re.compile(r"https?://[\x21-\x7e]+")
 _VALUE = re.compile(r"[^\x00\r\n]*")
 # Headers that the client writes itself.
 _OF_THE_CLIENT = frozenset({"host", "content-length", "connection"})
-# _TIMES: how often a finding's request is repeated. _LONGEST_S: time for all, s; the first finding of each requirement
-# comes first.
-_TIMES = 5
-_LONGEST_S = 8.0
+_TIMES = 5  # how often a finding's request is repeated
+_LONGEST_S = 8.0  # time for all findings, s; the first one of each requirement is repeated first
 
 
 class SentListener(Listener):

@@ -102,12 +102,10 @@ def _remedies(failed: Sequence[str], server: str) -> Iterator[str]:
 
 RESULT_FORMAT = "roaas-result/1"
 RESULT_NAME = "result.json"
-# _SHOWN_BODY: characters of a body that the result keeps, beside its length. _SHOWN_CURL: characters of a command.
-_SHOWN_BODY = 4096
-_SHOWN_CURL = 20_000
-# _COMMANDS: operations of a finding that get a command. _SHORT_CURL: characters of such a command.
-_COMMANDS = 30
-_SHORT_CURL = 2000
+_SHOWN_BODY = 4096  # characters of a body that the result keeps; it always has the length
+_SHOWN_CURL = 20_000  # longest command, characters
+_COMMANDS = 30  # operations of a finding for which the result has a curl command
+_SHORT_CURL = 2000  # longest such command, characters
 _LIBRARIES = ("schemathesis", "hypothesis", "zeep", "lxml", "xmlschema", "h11")
 
 

@@ -115,10 +115,8 @@ class RosEnds:
 _GRACE_S = 3.0
 # A slow robot gets instead the time of this many responses.
 _GRACE_ANSWERS = 10
-# _LOOKS: responses that show the robot's usual speed. _FEWEST_LOOKS: the fewest, if more would take longer than the
-# time below, s.
-_LOOKS = 11
-_FEWEST_LOOKS = 5
+_LOOKS = 11  # responses that show the robot's usual speed
+_FEWEST_LOOKS = 5  # responses that are measured even if they take longer than _LOOKING_S
 _LOOKING_S = 1.0
 # After this time the command says what it waits for, s.
 _SILENT_S = 2.0

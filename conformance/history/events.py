@@ -227,10 +227,8 @@ Event = Began | Sent | Withdrawn | Span | Seen | Eye | Ended
 
 
 _MOST: Final = 512 << 20
-# _MOST_UNPACKED: bytes of all events, unpacked. _MOST_LINE: bytes of one event with 1 MiB of request and response,
-# escaped.
-_MOST_UNPACKED: Final = 4 << 30
-_MOST_LINE: Final = 64 << 20
+_MOST_UNPACKED: Final = 4 << 30  # bytes of all events, unpacked
+_MOST_LINE: Final = 64 << 20  # bytes of one event with 1 MiB of request and response, escaped
 _PIECE: Final = 1 << 20
 
 

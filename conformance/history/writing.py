@@ -27,9 +27,8 @@ _GZIP: Final = 31
 _FAST: Final = 1
 # Events are collected this long before they are written, s: at most these are lost.
 _GATHERED_S: Final = 0.1
-# _MOST: bytes of a history on disk, ten times those of a long run. _LAST_S: longest wait at the end, s.
-_MOST: Final = 512 << 20
-_LAST_S: Final = 60.0
+_MOST: Final = 512 << 20  # bytes of a history on disk, ten times those of a long run
+_LAST_S: Final = 60.0  # longest wait at the end, s
 
 
 class HistoryWriter(Recorder):

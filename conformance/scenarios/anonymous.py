@@ -27,8 +27,7 @@ _UNDECIDED: Final = frozenset({404, 409, 410})
 _MAY_BE_CREATED: Final = frozenset({200, 201, 202})
 # Of a slow device: operations that are sent without credentials on a connection that has carried some.
 _KEPT: Final = 3
-# _NEVER: number for an identifier that nobody creates.
-_NEVER: Final = 97
+_NEVER: Final = 97  # number for an identifier that nobody creates
 _ABSENT: Final = "roaas-is-not-there"
 
 

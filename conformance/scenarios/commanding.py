@@ -26,8 +26,9 @@ from conformance.scenarios.survey import Probe, Surveyor
 from conformance.scenarios.writing import Writer
 from conformance.transport.exchange import NoAnswerError, Outgoing
 
-# Commands that are tried, and how often each. _PAUSE_S: between two reads of a thing that has not acted yet, s.
-_MOST, _TURNS, _PAUSE_S = 12, 2, 0.3
+_MOST = 12  # most commands that are tried, and most tries of each
+_TURNS = 2
+_PAUSE_S = 0.3  # between two reads of a thing that has not acted yet, s
 # Bodies that are tried until one is taken.
 _TRIED: Final = 8
 _CREATED: Final = frozenset({201, 202})

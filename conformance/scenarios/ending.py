@@ -35,8 +35,8 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.writing import Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError
 
-# _BEGINNING: operations that start an activity. _KINDS: kinds of things that are tried.
-_BEGINNING, _KINDS = 2, 3
+_BEGINNING = 2  # operations that start an activity
+_KINDS = 3  # kinds of things that are tried
 # Words in names of numbers that tell how long an activity lasts; how much longer it is to last; new things for it.
 _LASTING: Final = frozenset(
     {
@@ -56,8 +56,8 @@ _LASTING: Final = frozenset(
     }
 )
 _LONGER, _NEW = 20, 2
-# _READY_S: how long a thing is waited for that has to get ready, s. _PAUSE_S: pause between reads, s.
-_READY_S, _PAUSE_S = 1.2, 0.1
+_READY_S = 1.2  # how long the suite waits for a new thing to get ready, s
+_PAUSE_S = 0.1  # pause between reads, s
 _CONFLICT: Final = 409
 # How long after it was cancelled an activity is read again, s.
 _GOES_ON_S: Final = 2.5

@@ -19,10 +19,9 @@ from conformance.scenarios.survey import Surveyor
 from conformance.scenarios.writing import Writer
 from conformance.transport.exchange import Exchange
 
-# Lists that are tried. Below: entries that are created in each. _LIMIT: items of a page without a declared maximum.
-_LISTS: Final = 4
-_ENTRIES: Final = 3
-_LIMIT: Final = 100
+_LISTS: Final = 4  # lists that are tried
+_ENTRIES: Final = 3  # entries that are created in each list
+_LIMIT: Final = 100  # items to request for a page if no maximum is declared
 # In this turn, the usual body is sent.
 _USUAL: Final = 1
 _CHANGES: Final = ("PATCH", "PUT")

@@ -26,32 +26,25 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 from conformance.verdict.time_limit import TimeIsOverError
 
-# _MADE: share of the requested cases that Schemathesis makes, because some are equal or cannot be sent. _COVERING:
-# cases for each parameter or body member.
-_MADE: Final = 0.7
-_COVERING: Final = 15
-# _READS: operations that the checks of HTTP read. _EACH_READ: requests for each. Below: other requests, and those with
-# a slow device. OPTIONS goes to every operation.
-_READS: Final = 8
-_EACH_READ: Final = 18
+_MADE: Final = 0.7  # share of the requested cases that Schemathesis makes, because some are equal or cannot be sent
+_COVERING: Final = 15  # cases for each parameter or body member
+_READS: Final = 8  # operations that the checks of HTTP read
+_EACH_READ: Final = 18  # requests that the checks of HTTP send for each of these operations
+# Other requests, and those with a slow device. OPTIONS goes to every operation.
 _HTTP: Final = 90
 _HTTP_SLOW: Final = 40
-# _ON_ONE_CONNECTION: reads on one connection for each operation at standard. _LEAST_ON_ONE: at least in all. Below:
-# with a slow device, and of several clients.
-_ON_ONE_CONNECTION: Final = 60
-_LEAST_ON_ONE: Final = 120
-_FEWEST: Final = 3
+_ON_ONE_CONNECTION: Final = 60  # reads on one connection for each operation at standard
+_LEAST_ON_ONE: Final = 120  # fewest reads on one connection, of all operations together
+_FEWEST: Final = 3  # fewest reads with a slow device, and by several clients
 _AT_ONCE: Final = 325
 # First requests, which measure the device's response time even if it has no reads.
 _FIRST: Final = 12
-# _ON_THINGS: requests to what the device keeps, if it can be changed; _EACH_ON_THINGS: for each operation. Below: how
-# long the run then waits for late changes, s.
-_ON_THINGS, _EACH_ON_THINGS = 250, 25
-_WAITS_S: Final = 6.0
-# _OWN_MS: the suite's own time for a request. _DRAWN_MS: for one drawn by Hypothesis, ms. Below: for its start, s.
-_OWN_MS: Final = 0.5
-_DRAWN_MS: Final = 5.5
-_START_S: Final = 0.5
+_ON_THINGS = 250  # requests to the device's collections and objects, if it allows changes
+_EACH_ON_THINGS = 25  # the same for each operation
+_WAITS_S: Final = 6.0  # how long the run then waits for late changes, s
+_OWN_MS: Final = 0.5  # the suite's own time for a request, ms
+_DRAWN_MS: Final = 5.5  # the suite's own time for a request that Hypothesis generates, ms
+_START_S: Final = 0.5  # time in which Hypothesis starts, s
 
 
 @dataclass(frozen=True)
@@ -158,10 +151,8 @@ def _round(value: float) -> str:
     return f"{float(f'{value:.2g}'):,.0f}" if value >= 1 else f"{value:.1g}"
 
 
-# TIMED_AGAIN: timed repeats; the quickest of them waited for no other request. _TIMED_OFTEN: repeats if the device
-# looks slower, because varying times prove nothing.
-TIMED_AGAIN: Final = 5
-_TIMED_OFTEN: Final = 25
+TIMED_AGAIN: Final = 5  # timed repeats; the quickest of them waited for no other request
+_TIMED_OFTEN: Final = 25  # repeats if the device looks slower, because varying times prove nothing
 #: A response time has grown if it is GROWN_TIMES as long and GROWN_MS longer.
 GROWN_TIMES: Final = 3.0
 GROWN_MS: Final = 50.0

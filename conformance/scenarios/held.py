@@ -23,8 +23,8 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey, Surveyor
 from conformance.transport.exchange import NoAnswerError, Outgoing
 
-# _HELD: operations that are tried. _OTHERS: operations tried after each of them.
-_HELD, _OTHERS = 6, 6
+_HELD = 6  # operations that are tried
+_OTHERS = 6  # operations that are tried after each of these
 # Operations after which a thing allows no further operation.
 _FINAL: Final = frozenset({"cancel", "abort", "stop", "end", "finish", "terminate"})
 

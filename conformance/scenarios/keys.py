@@ -31,8 +31,8 @@ from conformance.scenarios.whole_list import read_whole
 from conformance.scenarios.writing import Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
 
-# _OPERATIONS: operations that are tried. _TURN: number for request bodies that no other check sends.
-_OPERATIONS, _TURN = 6, 7100
+_OPERATIONS = 6  # operations that are tried
+_TURN = 7100  # number from which bodies are made that no other check sends
 # Keys of a round: the first one, and a new one.
 _KEYS: Final = 2
 # Members by which a response identifies the created thing.

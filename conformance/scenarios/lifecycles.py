@@ -43,16 +43,16 @@ from conformance.scenarios.writing import Write, Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError
 from conformance.transport.reach import is_same, joined, path_of
 
-# Things to create in a collection: _KEPT if nothing deletes them, _FEW at quick, _MANY otherwise.
+# Things to create in a collection: _KEPT if no operation deletes them, else _FEW at quick and _MANY at other efforts.
 _KEPT, _FEW, _MANY = 2, 3, 20
-# Multiples of an exploration's time that one collection may take: normally, and with a slow device.
-_BUDGETS, _SLOW_BUDGETS = 10, 3
+_BUDGETS = 10  # one collection may take this many times the time of an exploration
+_SLOW_BUDGETS = 3  # the same with a slow device
 # Operations of a thing that are called.
 _ACTIONS: Final = 3
 # How long a thing is left alone at most, s.
 _ALONE_S: Final = 6.0
-# _CLIENTS: clients that create things at the same time. _AT_ONCE: number for their first values.
-_CLIENTS, _AT_ONCE = 2, 110
+_CLIENTS = 2  # clients that create things at the same time
+_AT_ONCE = 110  # number from which the values of their first things are made
 # Numbers from which values are made, so that they differ: for changes, refused requests, and an identifier that is
 # never created.
 _CHANGED, _REFUSED, _NEVER = 30, 60, 99

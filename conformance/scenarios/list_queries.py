@@ -14,8 +14,8 @@ from conformance.documents.json_schema import kinds_of
 from conformance.documents.parameters import Parameter
 from conformance.documents.representation import flat
 
-# _FILTERS: filters of a list by which one thing is chosen. _MOST_ITEMS: items of that list.
-_FILTERS, _MOST_ITEMS = 3, 1000
+_FILTERS = 3  # filters of a list by which one thing is chosen
+_MOST_ITEMS = 1000  # longest list that is filtered, items
 # Pairs of parameters that are sent together.
 _TOGETHER: Final = 3
 # How many values are also sent together with a page limit.
@@ -28,9 +28,8 @@ _PLAIN: Final = re.compile(r"\b(?:without|no|not) (?:any )?wildcards?\b", re.IGN
 _NOWHERE: Final = "roaas7nowhere"
 # Texts that mean something in a regular expression, and in SQL's LIKE.
 _SPECIAL: Final = ("(", "%")
-# _LATER: between the last item and an instant after it. _FAR: difference from UTC of a distant time zone.
-_LATER: Final = timedelta(hours=1)
-_FAR: Final = timedelta(hours=11)
+_LATER: Final = timedelta(hours=1)  # between the last item and a time after it
+_FAR: Final = timedelta(hours=11)  # difference from UTC of a distant time zone
 
 
 def queries_of(

@@ -45,20 +45,15 @@ from conformance.transport.exchange import Exchange, NoAnswerError
 from conformance.transport.reach import is_same, joined, split
 from conformance.verdict.evidence import SENTENCE
 
-# _PAGES: consecutive pages to read, with _LARGE items at most where the limit allows that. _VALUES: values of one
-# parameter at quick; below, at other efforts.
 _LARGE: Final = 50
-_PAGES: Final = 4
-_VALUES: Final = {"quick": 8}
+_PAGES: Final = 4  # consecutive pages to read, with _LARGE items at most where the limit allows that
+_VALUES: Final = {"quick": 8}  # values of one parameter at quick
 _MOST_VALUES: Final = 12
-# _BUDGETS: multiple of an exploration's time that one list may take. _SLOW_SHARE: a list that once took over a second
-# gets this fraction.
-_BUDGETS: Final = 3
-_SLOW_SHARE: Final = 4
-# _TRIES: tries of a fault. _TWICE: tries that must show it. Below: reads that must show the same list before and after.
-_TRIES: Final = 4
-_TWICE: Final = 2
-_STEADY: Final = 3
+_BUDGETS: Final = 3  # multiple of an exploration's time that one list may take
+_SLOW_SHARE: Final = 4  # a list with a response of over a second gets this fraction of the time
+_TRIES: Final = 4  # how often a fault is tried again
+_TWICE: Final = 2  # tries that must show it
+_STEADY: Final = 3  # reads that must show the same list before and after
 # A server may cut a list at a multiple of this number of items.
 _ROUND: Final = 5
 # Further members by which a list is sorted while its pages are read, and filters by which it is filtered.

@@ -21,14 +21,14 @@ from conformance.transport.exchange import Exchange, Outgoing
 
 #: An entity tag that no content has.
 NO_TAG: Final = '"roaas-nothing-has-this-tag"'
-# _TRIED: values of an id that are tried. _QUERIES: queries of one operation. _AT_QUICK: of all at quick.
-_TRIED, _QUERIES, _AT_QUICK = 3, 3, 8
+_TRIED = 3  # values of an id that are tried
+_QUERIES = 3  # queries of one operation
+_AT_QUICK = 8  # operations and queries at quick, together
 # Refusals before each read at standard effort; at quick two.
 _REFUSALS: Final = 8
 # Reads of each operation: with the timed reads at the end, one wrong response in twenty is found.
 _READS: Final = 20 - TIMED_AGAIN
-# _LONG: bytes that content needs before parts of it are requested.
-_LONG: Final = 8
+_LONG: Final = 8  # bytes that content needs before parts of it are requested
 _PARTS: Final = ((("Range", "bytes=2-5"),), (("Range", "bytes=-4"),), (("Range", "bytes=0-3"), ("If-Range", NO_TAG)))
 # Usual response time below which operations are read more often, ms.
 _QUICK_MS: Final = 50.0

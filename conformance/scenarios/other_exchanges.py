@@ -31,12 +31,12 @@ from conformance.verdict.time_limit import TimeIsOverError
 
 # Different responses that are kept, so that a long run needs no more memory.
 _MOST: Final = 2000
-# Things that are read at the end: by then even a slow device has created or removed them.
-_MOST_THINGS, _REMEMBERED = 40, 400
+# Things that are read at the end of a run, when even a slow device has created or deleted them.
+_MOST_THINGS = 40
+_REMEMBERED = 400  # things that are remembered for that
 # A device may carry out a request this long after its response, s: slightly longer than the checkers wait.
 _SETTLES_S: Final = 3.2
-# _MOST_DELETED: things that are deleted at the end.
-_MOST_DELETED: Final = 10
+_MOST_DELETED: Final = 10  # things that are deleted at the end
 _DONE: Final = frozenset({200, 204})
 _ERRORS: Final = range(400, 500)
 _ANY_FORMAT: Final = frozenset({None, "*/*", "application/json"})

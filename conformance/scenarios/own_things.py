@@ -50,10 +50,9 @@ from conformance.transport.parallel import send_together
 #: Way by which a list below another thing is read.
 ANOTHER: Final = "another thing"
 _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
-# _SETTLES_S: how long a deleted thing may still be listed, s. _PAUSE_S: pause between reads, s.
-_SETTLES_S, _PAUSE_S = 3.2, 0.4
-# _NEITHER: a list of entity tags that no content has.
-_NEITHER: Final = f'{NO_TAG}, "roaas-nor-this"'
+_SETTLES_S = 3.2  # how long a deleted thing may still be listed, s
+_PAUSE_S = 0.4  # pause between reads, s
+_NEITHER: Final = f'{NO_TAG}, "roaas-nor-this"'  # a list of entity tags that no content has
 _GONE_PLACE, _STALE = "path of what was deleted", "earlier revision in the body"
 _OCTETS, _TEXT = "application/octet-stream", "text/plain"
 # How a client sends content of unknown length (RFC 9112 7.1).

@@ -22,8 +22,8 @@ FILES: Final = (
     bytes(range(256)) * 17 + b"\r\n\n \0end",
     b"roaas\r\n\0\r\xff\xfe\n\n\x1a tail \r\n" * 9,
 )
-# Collections of files, and media types of each, that are tried.
-_COLLECTIONS, _TYPES = 2, 3
+_COLLECTIONS = 2  # collections of files that are tried
+_TYPES = 3  # media types that are tried for each
 
 
 def post_files(surveyor: Surveyor, operations: Mapping[tuple[str, str], Operation]) -> None:

@@ -29,9 +29,8 @@ CONFLICT: Final = 409
 #: The device demands a condition, or the condition in the request does not hold.
 WANTS_CONDITION: Final = frozenset({412, 428})
 _IF_MATCH: Final = "if-match"
-# _AROUND: refused operations that are tried. _QUIET: exceptions that are ignored.
-_AROUND: Final = 4
-_QUIET: Final = (NotPossibleError, TimeIsOverError, NoAnswerError)
+_AROUND: Final = 4  # refused operations that are tried again
+_QUIET: Final = (NotPossibleError, TimeIsOverError, NoAnswerError)  # exceptions that are ignored
 
 
 @dataclass

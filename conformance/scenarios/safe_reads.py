@@ -35,9 +35,9 @@ from conformance.scenarios.survey import Surveyor
 from conformance.scenarios.writing import Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError, NotPermittedError, Outgoing
 
-# _ROUNDS: rounds after the first in which a change must show. _WATCHED: resources that are watched.
-_ROUNDS, _WATCHED = 3, 12
-# Shortest and longest time that resources are left alone, s.
+_ROUNDS = 3  # rounds after the first: in each, the change must show again
+_WATCHED = 12  # resources that are watched
+# Shortest and longest time for which no request is sent, s.
 _LEAST_S, _MOST_S = 0.3, 5.0
 # Number from which the values that are written first are made.
 _TURN: Final = 41

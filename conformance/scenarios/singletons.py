@@ -41,12 +41,12 @@ _KEEPING: Final = frozenset(
 _MOST_VALUES, _MOST_ITEMS = 5, 10
 # Added to numbers that may have a fraction.
 _PART: Final = 0.375
-# Members of one resource that are written: _FEW_MEMBERS at quick, _MEMBERS otherwise. _RESOURCES: resources.
-_FEW_MEMBERS, _MEMBERS, _RESOURCES = 4, 30, 6
+_FEW_MEMBERS = 4  # members of one resource that are written at quick; otherwise _MEMBERS
+_MEMBERS = 30
+_RESOURCES = 6  # resources that are written
 _ACCEPTED: Final = 202
-# _BUDGETS: multiple of an exploration's time that one resource may take. _TURNS: other values of an object that are
-# tried.
-_BUDGETS, _TURNS = 2, 3
+_BUDGETS = 2  # multiple of an exploration's time that one resource may take
+_TURNS = 3  # other values of an object that are tried
 
 
 def singletons(writer: Writer, operations: Mapping[tuple[str, str], Operation]) -> list[Life]:

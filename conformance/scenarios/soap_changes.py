@@ -39,16 +39,15 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Outgoing
 from conformance.transport.parallel import MOST_CLIENTS, Addressed, send_together
 
-# _STEP_S: pause between reads while a value is awaited, s. _LATE_S: after it each write must show, s.
-_STEP_S, _LATE_S = 0.1, 3.2
+_STEP_S = 0.1  # pause between reads while a value is awaited, s
+_LATE_S = 3.2  # longest time until a read shows a write, s
 # Longest time for all changes of one operation, s.
 _BUDGET_S: Final = 12.0
-# _REFUSALS: refused messages. _THINGS: things that are written beside each other.
-_REFUSALS, _THINGS = 3, 3
-# _READS: successive reads of each operation. _ROUNDS: rounds of simultaneous reads. Both at quick and at other efforts.
-# _FEW: reads and changes of things that `soap_things` reads and changes.
-_READS: Final = (18, 60)
-_FEW: Final = 5
+_REFUSALS = 3  # refused messages that are sent
+_THINGS = 3  # things that are written in turn
+_READS: Final = (18, 60)  # successive reads of each operation, at quick and at other efforts
+_FEW: Final = 5  # most calls of an operation on things that `soap_things` tests too
+# Rounds of simultaneous reads, at quick and at other efforts.
 _ROUNDS: Final = (6, 30)
 # Encodings of messages, with their kind, what they are written in, and the number of a change whose text is beyond
 # ASCII. XML 1.0, 2.2: UTF-16 is no choice; 4.1: any character may be a reference.

@@ -35,16 +35,13 @@ if TYPE_CHECKING:
 
 # Faults of invalid messages that are sent: services disagree about others, such as order and namespaces.
 _FORBIDDEN: Final = ("missing", "unknown", "lexical", "range")
-# _MOST: invalid messages of each kind of an operation at standard. _USUAL: usual messages.
-_MOST: Final = 4
-_USUAL: Final = 6
+_MOST: Final = 4  # invalid messages of each kind of an operation at standard
+_USUAL: Final = 6  # usual messages of each operation
 _REPEATED: Final = 2
 # Longest time for one operation, s.
 _BUDGET_S: Final = 20.0
-# _SURVEY_SHARE: with a time limit, other messages than usual ones end at this share of it. _MANY: more than all
-# messages.
-_SURVEY_SHARE: Final = 0.85
-_MANY: Final = 1000
+_SURVEY_SHARE: Final = 0.85  # with a time limit, only usual messages are sent after this share of it
+_MANY: Final = 1000  # more than the messages of any operation: send all
 # Values from the device that are tried for one operation.
 _TRIED: Final = 3
 # Wrong messages for any operation, and at quick, after those operations that get them all; invalid messages that a

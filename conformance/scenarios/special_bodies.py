@@ -23,19 +23,15 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.scenarios.singletons import is_harmless
 
-# Lines with two kinds of ends. Below: names of members that have several lines.
-_LINES: Final = "roaas\r\n\r\n two\nend"
+_LINES: Final = "roaas\r\n\r\n two\nend"  # lines with both kinds of line ends
+# Names of members whose text may have several lines.
 _LONG: Final = re.compile(r"note|description|comment|text|remark|message|memo|instruction|detail|body|content|reason")
-# _PARTS: fractions, several for each member. _ALL_DIGITS: needs all digits of a double. Below: an integer that is no
-# double.
-_PARTS: Final = (0.375, 0.5, 0.25, 0.1)
-_ALL_DIGITS: Final = 0.12345678901234
-_BEYOND_DOUBLES: Final = 2**53 + 1
-# Keys of a map's entries; characters of the longest text.
-_KEYS: Final = ("roaas-one", "roaas-two", "roaas-three")
-_LONGEST: Final = 300
-# Members that are removed by null, where a patch allows that.
-_NULLS: Final = 2
+_PARTS: Final = (0.375, 0.5, 0.25, 0.1)  # fractions, several for each member
+_ALL_DIGITS: Final = 0.12345678901234  # a number that needs all digits of a double
+_BEYOND_DOUBLES: Final = 2**53 + 1  # an integer that is no double
+_KEYS: Final = ("roaas-one", "roaas-two", "roaas-three")  # keys of entries that are added to a map
+_LONGEST: Final = 300  # longest text that is sent, characters
+_NULLS: Final = 2  # members that a patch removes by null, where that is allowed
 _TIME: Final = "2026-02-{:02}T12:34:56+02:00"
 
 

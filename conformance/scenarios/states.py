@@ -17,10 +17,8 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.state_map import StateMap
 from conformance.transport.exchange import Exchange, NoAnswerError
 
-# _PACE_S: pause between reads of the state, s. _STAYS_S: how long a reached state, or one after a refusal, is watched,
-# s.
-_PACE_S: Final = 0.03
-_STAYS_S: Final = 0.3
+_PACE_S: Final = 0.03  # pause between reads of the state, s
+_STAYS_S: Final = 0.3  # how long the state is watched after it was reached, and after a refusal, s
 _KEEPS_S: Final = 0.1
 # Tries of an operation that comes too late for a state that changes by itself.
 _TRIES: Final = 3

@@ -44,8 +44,8 @@ from conformance.verdict.time_limit import TimeIsOverError
 
 # Members of a refused request that are sent alone.
 _MOST_PARTS: Final = 24
-# _TRIED: refused requests that are tried again in other states. _STATES: such states.
-_TRIED, _STATES = 3, 2
+_TRIED = 3  # refused requests that are tried again in other states
+_STATES = 2  # states in which they are tried
 #: Timed sends of the usual request before other groups and after each, at standard effort: a failure in one of twenty
 #: is found.
 TIMED: Final = 5
@@ -63,19 +63,17 @@ _NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
 _CHARSET: Final = "header Content-Type"
 #: Statuses that refuse a request for its content, or for the thing's state.
 REFUSALS: Final = frozenset({400, 404, 405, 409, 411, 412, 413, 415, 422})
-# _DOUBTED: statuses that may refuse a second thing with the same name. _ACCEPTED: requests that must be accepted.
-_DOUBTED: Final = frozenset({400, 409, 422})
+_DOUBTED: Final = frozenset({400, 409, 422})  # statuses that may refuse a second thing with the same name
+# Requests that must be accepted.
 _ACCEPTED: Final = frozenset({Kind.EXAMPLE, Kind.DEFAULT, Kind.ENUM, Kind.OPTIONAL, Kind.BOUND, Kind.GENERATED})
 # Kinds of requests that generated requests cover too, so they need not be sent again.
 _JUDGED: Final = frozenset({Kind.OPTIONAL, Kind.BOUND, Kind.INVALID, Kind.MISSING})
-# REPEATS: repeats of one request; FEWEST_REPEATS at least.
-REPEATS: Final = 200
+REPEATS: Final = 200  # repeats of one request at standard effort; never below FEWEST_REPEATS
 FEWEST_REPEATS: Final = 60
 #: Cases of Schemathesis for an operation: that cover its schema, and that are drawn.
 COVERAGE: Final = 150
 FUZZED: Final = 40
-# BUDGETS: multiple of an exploration's time that one operation may take, so that a slow one does not take the whole
-# run.
+# Multiple of an exploration's time that one operation may take, so that a slow one does not take the whole run.
 BUDGETS: Final = 3
 # Share of a time limit after which the survey sends only usual requests.
 SURVEY_SHARE: Final = 0.5

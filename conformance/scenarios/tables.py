@@ -31,11 +31,10 @@ from conformance.scenarios.writing import Writer
 from conformance.transport.exchange import Exchange, NoAnswerError
 
 _CSV: Final = "text/csv"
-# _NEAR: how much a table may round numbers that JSON shows in full.
-_NEAR: Final = {"rel_tol": 0.01, "abs_tol": 0.01}
+_NEAR: Final = {"rel_tol": 0.01, "abs_tol": 0.01}  # how much a table may round numbers that JSON shows in full
 _LARGEST: Final = 1 << 20
-# _CREATED: things with quoted texts that are created. _COMMAS: phrases in a description that name the separator.
-_CREATED: Final = 2
+_CREATED: Final = 2  # things with quoted texts that are created
+# Phrases in a description that name the separator.
 _COMMAS: Final = re.compile(r"RFC\s*4180|\bcommas?\b|`\w+(?:,\s?\w+)+`", re.IGNORECASE)
 # First characters of a text that a table may change, so that no program runs it as a formula.
 _FORMULA: Final = ("=", "+", "-", "@", "\t")

@@ -19,11 +19,11 @@ from conformance.documents.representation import flat
 from conformance.observe.clock import Patience
 from conformance.transport.exchange import Exchange, Outgoing
 
-# _SETTLES_S: how much later than its response a device may write, s. _PAUSE_S: pause between reads, s.
-_SETTLES_S: Final = 3.0
-_PAUSE_S: Final = 0.2
-# _LAST: a value that differs in this many last reads is still changing, as a moving valve does.
-_LAST: Final = 5
+_SETTLES_S: Final = 3.0  # a device may apply a write this long after its response, s
+_PAUSE_S: Final = 0.2  # pause between reads, s
+_LAST: Final = (
+    5  # a value that differs in each of this many last reads is still changing, like the place of a moving valve
+)
 _ACCEPTED: Final = 202
 # Members of a resource that are written singly.
 _MEMBERS: Final = 6

@@ -4,9 +4,10 @@ import zlib
 from typing import Final, NamedTuple
 
 _GZIP: Final = frozenset({"gzip", "x-gzip"})
-# zlib's arguments for gzip data with its checksum, for zlib's data, and for the bare data that some servers send as
-# deflate (RFC 9110 8.4.1.2); octets of decoded content that are read, and members, each of which copies what is left.
-_GZIP_BITS, _DEFLATE_BITS, _LARGEST, _MEMBERS = 31, (15, -15), 1 << 25, 100
+_GZIP_BITS = 31  # argument of zlib for gzip data
+_DEFLATE_BITS = (15, -15)  # for zlib data, and for the raw data that some servers send as deflate (RFC 9110 8.4.1.2)
+_LARGEST = 1 << 25  # longest decoded content that is read, bytes
+_MEMBERS = 100  # most members of gzip data: each of them copies the remaining data
 
 
 class Content(NamedTuple):

@@ -312,8 +312,9 @@ def quoted(word: str) -> str | None:
     return '"' + "".join(part.replace("!", "\"'!'\"") for part in escaped) + '"'
 
 
-# _VARIABLES: placeholders for the texts that differ in each message. _TOKEN: the places of these texts.
+# Placeholders for the texts that differ in each message.
 _VARIABLES: Final = (b"$WSSE_DIGEST", b"$WSSE_NONCE", b"$WSSE_CREATED")
+# The headers in which these texts stand.
 _TOKEN: Final = re.compile(rb"(:Password [^>]*>)[^<]*(<.*?:Nonce [^>]*>)[^<]*(<.*?:Created>)[^<]*", re.DOTALL)
 
 

@@ -28,10 +28,9 @@ from conformance.transport.passage import Heard, Passage
 from conformance.transport.reach import ElsewhereError, Trust, UnreachableError
 
 _REDIRECTS: Final = 4
-# _MOST_OCTETS: bytes of one document. _MOST_IN_ALL: of all documents that a description refers to. Below: time, s.
-_MOST_OCTETS: Final = 32 * 1024 * 1024
-_MOST_IN_ALL: Final = 256 * 1024 * 1024
-_MOST_SECONDS: Final = 300.0
+_MOST_OCTETS: Final = 32 * 1024 * 1024  # longest document, bytes
+_MOST_IN_ALL: Final = 256 * 1024 * 1024  # bytes of all documents that a description refers to
+_MOST_SECONDS: Final = 300.0  # time for all documents, s
 _PIECE: Final = 1024 * 1024
 _ACCEPT: Final = "application/json, application/yaml, */*"
 

@@ -21,16 +21,16 @@ _LATE_S = 0.1
 #: doubles with each further hang. Two failures far apart in a long run do not count.
 HANGS: Final = 2
 _HANGS_WITHIN_S: Final = 60.0
-# After _MOST_WAITED_S spent on hangs, a request waits only for _HURRIED_S, or _SLOWER times the slowest response, s.
+# After timeouts of _MOST_WAITED_S together, a request waits only for _HURRIED_S, or _SLOWER times the slowest response.
 _MOST_WAITED_S: Final = 60.0
 _HURRIED_S, _SLOWER = 2.0, 3.0
 # Times that a request is sent that the device puts off: by 429, and by 503, which may be the state of a thing as well.
 _TRIES: Final = {TOO_MANY: 6, UNAVAILABLE: 3}
-# Wait before the second try if the device asks for none, which grows with each try; the longest of them, s.
+# Wait before the second try if the response has no Retry-After; factor for each further try; longest wait, s.
 _BACKOFF_S, _GROWTH, _LONGEST_BACKOFF_S = 0.02, 4, 3.0
-# Longest that a device may ask to wait; that all requests may, as many a limit counts for a minute, s.
-_PUT_OFF_S, _SHARED_S = 10.0, 90.0
-# Refusals by 429 in a row, of this many endpoints, that show a limit which all requests share.
+_PUT_OFF_S = 10.0  # longest Retry-After that the suite waits for, s
+_SHARED_S = 90.0  # longest wait for a limit that counts all requests, in all: many such limits last a minute, s
+# So many responses 429 in a row, from so many endpoints, show a limit that counts all requests.
 _IN_ROW, _ENDPOINTS = 12, 2
 
 

@@ -46,8 +46,8 @@ _REQUEST_LINE = re.compile(
 _MOST = 4 * 1024 * 1024
 _MOST_INTERIM = 100
 _SHORT = 64 * 1024
-# _TO_CONNECT_S: shortest wait for a connection, s. _SILENCES: kinds of missing responses.
-_TO_CONNECT_S = 0.05
+_TO_CONNECT_S = 0.05  # shortest wait for a connection, s
+# Kinds of missing responses.
 _SILENCES = {
     NoAnswer.CLOSED: "the server closed the connection without a response",
     NoAnswer.TIMEOUT: "no response within the deadline",

@@ -19,7 +19,7 @@ PORTS: Final = {"http": 80, "https": 443}
 _BLANK: Final = re.compile(r"[\x00-\x20\x7f]")
 _NAME: Final = re.compile(r"[a-z0-9._~-]+")
 _SCHEME: Final = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")
-# _HERE: names of this machine. They count as different hosts, because one may be forwarded elsewhere.
+# Names of this machine. They count as different hosts, because one may be forwarded elsewhere.
 _HERE: Final = frozenset({"localhost", "127.0.0.1", "::1"})
 _MOST_OCTETS: Final = 32 * 1024 * 1024
 

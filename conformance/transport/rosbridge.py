@@ -19,9 +19,8 @@ from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError, Re
 from conformance.transport.passage import Heard, Passage
 from conformance.transport.streams import Stream
 
-# _BEHIND_S: wait for the response to a call after a publication. _AT_ONCE_S: for the rejection of a goal, s.
-_BEHIND_S: Final = 2.0
-_AT_ONCE_S: Final = 0.3
+_BEHIND_S: Final = 2.0  # wait for the response to a call after a publication, s
+_AT_ONCE_S: Final = 0.3  # wait for the rejection of a goal, s
 _BEHIND: Final = "/rosapi/get_time"
 
 

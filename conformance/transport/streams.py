@@ -20,9 +20,8 @@ from conformance.transport.exchange import NoAnswer, NoAnswerError, NotPermitted
 from conformance.transport.passage import Heard, Passage
 
 Kind = Literal["sse", "websocket"]
-# _KEPT: messages of a stream that are kept. _LONGEST: bytes of an event's line or of a message.
-_KEPT: Final = 2000
-_LONGEST: Final = 16 * 1024 * 1024
+_KEPT: Final = 2000  # messages of a stream that are kept
+_LONGEST: Final = 16 * 1024 * 1024  # longest line of an event, and longest message, bytes
 _EVENTS: Final = "text/event-stream"
 
 

@@ -13,8 +13,9 @@ from typing import TypeVar
 
 _Item = TypeVar("_Item")
 EFFORTS = ("quick", "standard", "deep")
-#: DEEP_MINUTES: duration of a deep run without --minutes. _FACTORS: share of the standard cases, by effort.
+#: Duration of a deep run without --minutes.
 DEEP_MINUTES = 10.0
+# Share of the standard cases, by effort.
 _FACTORS = {"quick": 0.1, "standard": 1.0}
 _BUDGETS_S = {"quick": 2.0, "standard": 10.0}
 _FEWEST = 3

@@ -27,15 +27,13 @@ from conformance.verdict.finding import (
     subject_of,
 )
 
-# MAX_FINDINGS: findings of one requirement; the last stands for all further causes. MAX_SEQUENCES: findings that keep
-# all their requests.
-MAX_FINDINGS = 100
-MAX_SEQUENCES = 10
+MAX_FINDINGS = 100  # findings of one requirement; the last stands for all further causes
+MAX_SEQUENCES = 10  # findings that keep all their requests
 # Requests before a finding that are kept with it.
 MAX_SEQUENCE = 40
 _REST = "the rest"
-# _FAULT: characters of a suite error's message. _NAMED: operations that it names.
-_FAULT, _NAMED = 200, 3
+_FAULT = 200  # characters of the message on a suite error
+_NAMED = 3  # operations that this message names
 _REFUSED = 400
 # Numbers and quoted values: the parts of a text that differ between cases of one finding.
 _VALUES = re.compile(r"[-+]?\d[\d.e+-]*|'[^']*'|\"[^\"]*\"")

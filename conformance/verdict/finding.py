@@ -22,15 +22,15 @@ _KINDS = {
     NoAnswer.GATEWAY_TIMEOUT: CauseKind.HANG,
     NoAnswer.MALFORMED: CauseKind.UNREADABLE,
 }
-# _USUAL_FIELDS: headers that every request has or that do not explain a failure. _SHOWN_TARGET: characters of a target.
+# Headers that every request has or that do not explain a failure.
 _USUAL_FIELDS = frozenset({"host", "content-length", "connection", "authorization", "user-agent"})
-_SHOWN_TARGET = 120
+_SHOWN_TARGET = 120  # characters of a target
 _SHOWN_FIELD = 100
 _SHOWN_BODY = 200
 _SHOWN_CURL = 2000
 # Operations that one text names; result.json and the pages have all.
 _NAMED = 10
-# _NUMBERS: numbers, times and ids, which differ between responses with the same fault.
+# Numbers, times and ids, which differ between responses with the same fault.
 _NUMBERS = re.compile(r"[0-9a-f.:TZ+-]*\d[0-9a-f.:TZ+-]*")
 _FAULT = re.compile(rb"<(?:[\w.-]+:)?Fault[\s>]")
 

@@ -44,8 +44,7 @@ class Selection:
         return self.exit_first and self.has(requirement) and requirement not in self.accepted
 
 
-# _NEXT_TO_ALL: if more of the cases than this share were sent, the verdict does not mention the time limit.
-_NEXT_TO_ALL = 0.99
+_NEXT_TO_ALL = 0.99  # if more of the cases than this share were sent, the verdict does not mention the time limit
 _FEWEST_SHARE = 0.04
 
 

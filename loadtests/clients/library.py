@@ -24,9 +24,8 @@ from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
 from loadtests.clients.wsdl import loader
 
-# _MOST: longest response, compressed or not, bytes. _COOKIES: most cookies.
-_MOST: Final = 16 * 1024 * 1024
-_COOKIES: Final = 100
+_MOST: Final = 16 * 1024 * 1024  # longest response, compressed or not, bytes
+_COOKIES: Final = 100  # most cookies
 _PIECE: Final = 65_536
 #: Beginning of each error message for a response that is too long.
 TOO_LONG: Final = f"the response is longer than {_MOST} bytes"

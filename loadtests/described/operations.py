@@ -34,8 +34,7 @@ from loadtests.described.device import Device
 from loadtests.settings.settings import Scenario, SettingsError
 from loadtests.statistics.recorder import MOST_OPERATIONS
 
-#: _TRIED: messages of an operation that changes something, tried until the device accepts one.
-_TRIED = 4
+_TRIED = 4  # messages of an operation that are tried until the device accepts one
 _STREAM = "its response does not end, as that of a stream"
 _FIRST, _LAST = 200, 399  # statuses that are no errors (RFC 9110 section 15)
 _ANY_SUCCESS = range(200, 300)
@@ -206,9 +205,9 @@ def declared_good(operation: Operation) -> tuple[tuple[int, tuple[str, ...]], ..
 
 
 _WEIGHTED = re.compile(r"(?P<name>.*?)(?:=(?P<weight>[1-9]\d{0,2}|1000))?", re.DOTALL)
-#: MOST: operations of a run; with more, each would get too few requests. _SHOWN: operations that a message names.
+#: Operations of a run; with more, each would get too few requests.
 MOST = 16
-_SHOWN = 12
+_SHOWN = 12  # operations that a message names
 _LONGEST = 300
 #: Options that a scenario excludes, by their Python names, with their defaults.
 _OTHERWISE = {

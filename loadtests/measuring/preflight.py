@@ -140,7 +140,7 @@ def _same_double(one: float, other: float) -> bool:
     return struct.pack("<d", one) == struct.pack("<d", other)
 
 
-# A slow first read, up to _BY_CHANCE times a quick robot's time, may be chance: read _READS times.
+# If the first read took up to _BY_CHANCE times as long as with a fast robot, that may be chance: read _READS times.
 _READS, _BY_CHANCE = 3, 10
 
 

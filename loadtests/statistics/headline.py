@@ -23,10 +23,9 @@ MOST_CPU = 0.95
 #: How late requests may start, as a share of the median and of the p99 of the service time in blocks whose requests all
 #: started on time: a generator that waits for a processor measures its own waiting as service time.
 MOST_LAG = {"p50": 0.10, "p99": 0.20}
-#: LEAST_LAG_MS: a process needs this long to wake up, so a shorter lag does not count. LEAST_ACHIEVED: share of the
-#: rate.
+#: A shorter lag does not count, because a process needs this long to wake up, ms.
 LEAST_LAG_MS = {"p50": 0.05, "p99": 0.3}
-LEAST_ACHIEVED = 0.95
+LEAST_ACHIEVED = 0.95  # a run must achieve this share of its rate
 MOST_ERRORS = 0.01
 
 

@@ -17,7 +17,7 @@ from loadtests.statistics.measured import Measured
 _FEWEST, _POINTS = 100, 2000
 _SIGNIFICANCE = 0.01
 _RESAMPLED = 200
-# _TAIL: share of values at each end that is ignored, because Silverman's test takes a single slow request for a mode.
+# Share of values at each end that is ignored, because Silverman's test takes a single slow request for a mode.
 _TAIL = 0.01
 _CELLS = 512
 _BINS = 60

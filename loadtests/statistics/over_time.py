@@ -19,9 +19,10 @@ _PHASES = ("duel", "aa")
 WIDTH_S = 1.0
 #: A run is cut into so many parts, and a slope is fitted to their medians. Shorter parts would correlate.
 _PARTS = 20
-#: _WORTH: a smaller change of the median over the run is not reported. _STEADY: each of so many longer parts must be
-#: slower than the one before (or quicker), because a busy machine makes changes that come and go.
-_WORTH, _STEADY = 0.2, 5
+_WORTH = 0.2  # a smaller change of the median over the run is not reported
+# Each of this many parts of the run must be slower than the part before (or each quicker), because a busy machine
+# causes changes that do not last.
+_STEADY = 5
 
 
 def time_series(measured: Measured) -> dict[str, Any]:

@@ -27,9 +27,8 @@ _FEWEST_ROUNDS = 12
 _LENGTHS = (2, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96)
 #: A smaller correlation counts as none; so does one that few independent values show by chance (one standard error).
 _GONE = 0.1
-#: _MOST: beyond this correlation the formula for the variance fails. _LEAST_FOR_LAG: fewest rounds to estimate one.
-_MOST = 0.8
-_LEAST_FOR_LAG = 6
+_MOST = 0.8  # beyond this correlation the formula for the variance fails
+_LEAST_FOR_LAG = 6  # fewest rounds from which a correlation is estimated
 
 
 class Unit(NamedTuple):

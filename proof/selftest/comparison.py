@@ -23,7 +23,7 @@ from proof.selftest.at_once import each_at_once, run_program
 from proof.selftest.mutant_run import Pool, become
 
 EXAMPLES, LIMIT_S = 3, 40.0
-# Examples of a trial run, which shows the time of one; fewest and most examples that follow from it.
+# Examples of a trial run, which shows how long one takes; fewest and most examples of the run itself.
 _TRIED, _FEWEST_EXAMPLES, _MOST_EXAMPLES = 20, 10, 500
 # Operation and code of each finding.
 Findings = frozenset[tuple[str, str]]

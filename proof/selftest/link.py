@@ -19,9 +19,8 @@ from proof.selftest.at_once import safe_path
 Address = tuple[str, int]
 # An Ethernet frame's worth of TCP, octets.
 _SEGMENT = 1460
-# _WINDOW: bytes under way in one direction before the sender waits. _START_S: time to start, s.
-_WINDOW = 262_144
-_START_S = 20.0
+_WINDOW = 262_144  # bytes under way in one direction before the sender waits
+_START_S = 20.0  # time in which the link must start, s
 
 
 @dataclass(frozen=True)

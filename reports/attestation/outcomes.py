@@ -25,8 +25,7 @@ _VERDICTS = frozenset({"pass", "fail", "warn", "skip", "not-claimed", "error"})
 _CLASS_VERDICTS = frozenset({"pass", "fail", "inconclusive", "not-claimed"})
 _RUN_VERDICTS = frozenset({"conformant", "not-conformant", "inconclusive"})
 TESTED = frozenset({"pass", "fail", "warn"})
-# _KEPT: how a MUST of a passed class may have ended, unless its failure was accepted: it passed, did not apply, or
-# warned because a right device may do the same.
+# Statuses of a MUST in a passed class, unless its failure was accepted. It may warn if conforming devices may do so.
 _KEPT = frozenset({"pass", "not-claimed", "warn"})
 _NAMED = 3
 

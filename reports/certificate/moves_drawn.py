@@ -82,9 +82,9 @@ def _cells(
 
 
 TRACES_NAME: Final = "traces.json.gz"
-# _MOST: pictures of a certificate. _POINTS: points of a line. WIDTH, HEIGHT: size of one axis's drawing, CSS pixels.
-_MOST, _POINTS = 30, 160
-WIDTH, HEIGHT = 300, 64
+_MOST = 30  # pictures in a certificate
+_POINTS = 160  # points of a line
+WIDTH, HEIGHT = 300, 64  # size of one axis's drawing, CSS pixels
 _MARGIN: Final = 4
 # Smaller moves are not enlarged beyond this share of an axis's range.
 _LEAST: Final = 0.2

@@ -16,9 +16,9 @@ from reports.pages.page import counted, opened
 from reports.pages.untrusted import excerpt
 
 _AT_ONCE_MS, _FLOW_MS = 100.0, 1000.0
-#: _TAILS: by quantile, the share of requests within it. _BEYOND: the share beyond it.
+#: Share of the requests that are at most as slow as a quantile, in words.
 _TAILS = {"p99": "99 of 100", "p95": "95 of 100", "p90": "9 of 10"}
-_BEYOND = {"p99": "1 of 100", "p95": "1 of 20", "p90": "1 of 10"}
+_BEYOND = {"p99": "1 of 100", "p95": "1 of 20", "p90": "1 of 10"}  # share of the requests that are slower, in words
 _MOST = 6
 
 

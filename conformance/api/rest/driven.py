@@ -17,9 +17,9 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener
 
-# _MOST: values of one parameter that are remembered, and requests that one stop is made into. _REFUSED: statuses.
+# Most values of one parameter that are remembered, and most requests that a stop with parameters becomes.
 _MOST: Final = 64
-_REFUSED: Final = range(400, 500)
+_REFUSED: Final = range(400, 500)  # statuses of a refused request
 # Values that the device refused and that are remembered, for each parameter.
 _MOST_REFUSED: Final = 8
 

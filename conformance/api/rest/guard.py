@@ -19,9 +19,8 @@ from conformance.transport.credentials import Kind
 from conformance.transport.exchange import SAFE_METHODS
 
 _PROGRAM: Final = Path(__file__).with_name("guard_process.py")
-# _DEADLINE_S: deadline of each request of the guard, s. _ENDS_S: how long the run waits for the guard to end, s.
-_DEADLINE_S: Final = 3.0
-_ENDS_S: Final = 2.0
+_DEADLINE_S: Final = 3.0  # deadline of each request of the guard, s
+_ENDS_S: Final = 2.0  # how long the run waits for the guard to end, s
 # Renewing the list of stops may take _SHARE of the run's time plus _FREE_S seconds.
 _SHARE: Final = 0.05
 _FREE_S: Final = 0.1

@@ -29,7 +29,7 @@ from conformance.verdict.finding import few_of
 if TYPE_CHECKING:
     from conformance.api.rest.interface import RestInterface
 
-# _NAMED: ids, paths and operations that a line of the summary names; the result has all. _ID: characters of an id.
+# Ids, paths and operations that a line of the summary names; the result has all. _ID: characters of an id.
 _NAMED: Final = 3
 _ID: Final = 60
 _WANTS_CONDITION: Final = frozenset({HTTPStatus.PRECONDITION_FAILED, HTTPStatus.PRECONDITION_REQUIRED})

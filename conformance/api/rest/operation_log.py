@@ -27,9 +27,8 @@ if TYPE_CHECKING:
     from conformance.api.rest.interface import RestInterface
 
 _OK, _REDIRECT = 200, 300
-# _READ: bytes of a body that are searched for members of its schema. _ERRORS: first status of an error.
-_READ = 100_000
-_ERRORS: Final = 400
+_READ = 100_000  # bytes of a body that are searched for members of its schema
+_ERRORS: Final = 400  # statuses from this one on are errors
 # Statuses which say that the device's state forbids the operation; they prove as well as a success that it exists.
 _OF_STATE: Final = frozenset({409, 423})
 # A fault as the first element of a SOAP Body.

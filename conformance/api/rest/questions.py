@@ -23,9 +23,8 @@ from conformance.documents.representation import UnreadableError, read
 from conformance.transport.exchange import BUSY, Outgoing, Response
 from conformance.transport.parallel import Addressed
 
-# _MARK: start of values that only one client sends. _UNKNOWN: questions for unknown paths.
-_MARK: Final = "roaas-client-"
-_UNKNOWN: Final = 4
+_MARK: Final = "roaas-client-"  # start of values that only one client sends
+_UNKNOWN: Final = 4  # requests for unknown paths
 # Fields by which a client recognizes its response, and how many values of one are sent.
 _ECHOED: Final = frozenset({"xrequestid", "requestid", "xcorrelationid", "correlationid", "xtraceid"})
 _ECHOES: Final = 8

@@ -23,10 +23,9 @@ _USUAL_FIELDS = {
     "user-agent",
 }
 _USUAL_OCTETS = 2000
-# _CONDITIONS: headers that ask for a part or set a condition. _CONDITIONAL: statuses that only such requests get (RFC
-# 9110 13, 14).
+# Headers that ask for a part or set a condition.
 _CONDITIONS = frozenset({"range", "if-none-match", "if-modified-since", "if-match", "if-unmodified-since"})
-_CONDITIONAL = frozenset({206, 304, 412, 416})
+_CONDITIONAL = frozenset({206, 304, 412, 416})  # statuses that only such requests get (RFC 9110 13, 14)
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ from conformance.documents.representation import discriminator_of, flat
 TEXTS: Final = ('007 Zo\u00eb e\u0301 \U0001f916 a+b, & %41 \\ "', "007 Zo\u00eb e\u0301 \U0001f916")
 
 _DEPTH = 6
-# _OPTIONAL: optional members of a value, in all; _REQUIRED: required members and items, in all. Each member gets an
-# equal share for its own members, because schemas may refer to each other without end.
-_OPTIONAL = 1_000
+_OPTIONAL = 1_000  # most optional members of a value
+# Most required members and items of a value. Each member gets an equal share, because schemas may refer to
+# each other without end.
 _REQUIRED = 20_000
 #: A valid text for each format that JSON Schema, OpenAPI or its registry names.
 FORMATS: Mapping[str, str] = {

@@ -32,15 +32,12 @@ from conformance.transport.passage import Heard
 UNDELIVERED: Final = "the stop could not be delivered; the robot may still move"
 # Pause between two tries, s.
 _AGAIN_S: Final = 0.3
-# _DEADLINE_S: deadline of a stop request, s. _ANSWERS: a slow device gets this many of its usual response times
-# instead.
-_DEADLINE_S: Final = 2.0
-_ANSWERS: Final = 4
+_DEADLINE_S: Final = 2.0  # deadline of a stop request, s
+_ANSWERS: Final = 4  # a slow device gets this many of its usual response times instead
 # Longest time for one round of the stops that the description marks, s.
 _LONGEST_S: Final = 5.0
-# _READS: operations that are read to see whether the device moves. _MOVING: members that say so.
-_READS: Final = 8
-_MOVING: Final = frozenset({"moving", "driving"})
+_READS: Final = 8  # most operations that are read to see whether the device moves
+_MOVING: Final = frozenset({"moving", "driving"})  # names of members that show whether the device moves
 _PLACES: Final = frozenset(
     {
         "position",

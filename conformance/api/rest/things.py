@@ -18,11 +18,11 @@ from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 
-# Ends of path parameters whose value may be a member of another name: ``item_pk`` is the item's ``id``.
-# WHOLE: the member that a document is of itself, if it is a list, a number, a text or a boolean.
+# Name that stands for the whole document, if it is a list, a number, a text or a boolean and so has no members.
 WHOLE: Final = "the whole"
-#: SET: why a list may read in another order.
+#: Reason why a device may return a list in another order.
 SET: Final = "it may keep the items as a set, in which neither order nor repetition counts"
+# A path parameter that ends with one of these, such as ``item_pk``, may be the item's ``id``.
 _NUMBERED: Final = ("id", "uuid", "guid", "pk", "key", "number")
 # Members that a device sets itself or does not return. ``on`` alone is a switch; ``season``, ``format`` and ``standby``
 # are other words.
@@ -31,9 +31,9 @@ _OWN: Final = re.compile(
     r"|owner|author|user|password|secret|token|pin|key|[^a-z](?:at|by)|(?:[a-z]ed|[^a-z]?(?:seen|made|built|sent))_?on"
     r"|(?:created|updated|modified|changed|deleted|started|finished|completed)_?(?:at|by))$|^(?:at|by)$"
 )
-# _DELETED: states of things that are deleted and can still be read. _STATES: members that contain a state.
+# States of things that are deleted and can still be read.
 _DELETED: Final = re.compile(r"delet|remov|archiv|retire|decommission|trash|tombstone|gone|cancell?ed|aborted|revoked")
-_STATES: Final = ("status", "state", "lifecycle", "phase")
+_STATES: Final = ("status", "state", "lifecycle", "phase")  # members that contain a state
 _ALIVE: Final = frozenset({"active", "isactive", "alive"})
 # Words of a description: for a text or number that is stored as it is.
 _EXACTLY: Final = re.compile(
@@ -70,11 +70,10 @@ _BOUNDED: Final = frozenset({"pattern", "maxLength"})
 # Identifiers that the suite chooses where the client may choose them.
 _CHOSEN: Final = ("roaas-{}", "roaas{}", "3fa85f64-5717-4562-b3fc-2c963f66af{:02}")
 _CHOSEN_NUMBER: Final = 987_001
-# Other items of a list of objects that are made from one; _MANY where the schema says how many there may be.
-_ITEMS, _MANY = 2, 12
-# Added to numbers that may have a fraction. Below: offset of a distant time zone.
-_PART: Final = 0.375
-_ELSEWHERE: Final = "-05:00"
+_ITEMS = 2  # items that are added to a list of objects, made from its first one
+_MANY = 12  # the same, where the schema has maxItems or minItems
+_PART: Final = 0.375  # is added to numbers that may have a fraction
+_ELSEWHERE: Final = "-05:00"  # offset of a distant time zone
 _NEAR: Final = {"rel_tol": 0.02, "abs_tol": 0.01}
 _EQUAL: Final = {"rel_tol": 1e-15}
 _SECOND: Final = 1.0

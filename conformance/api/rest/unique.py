@@ -17,9 +17,8 @@ from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.openapi import Operation
 from conformance.documents.representation import flat
 
-# _TRIED: members of which unique values are tried. _COUNTED: characters of a text that are changed for that.
-_TRIED: Final = 6
-_COUNTED: Final = 8
+_TRIED: Final = 6  # most members of a body that get unique values
+_COUNTED: Final = 8  # characters of a text that are changed to make it unique
 # Distance between two unique values: other code, which counts up by one, does not reach the next of ours.
 _STEP: Final = 7919
 # Values that are tried until one is found that was not sent before.

@@ -21,8 +21,8 @@ from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
 from conformance.transport.exchange import Exchange, Outgoing
 
-# _REMEMBERED: values of a name that are remembered. _TRIED: those that are tried in one place.
-_REMEMBERED, _TRIED = 16, 4
+_REMEMBERED = 16  # values that are remembered for each name
+_TRIED = 4  # remembered values that are tried in one place
 _DEPTH = 6
 #: Usual members that identify an item of a collection.
 IDS = ("id", "uuid", "name", "key", "slug")

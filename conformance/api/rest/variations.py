@@ -19,9 +19,8 @@ from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import Parameter, plain_name
 from conformance.documents.representation import flat
 
-# _FEW: enum values, examples and optional members that are tried in one place. DEPTH: how deep in a body.
-_FEW: Final = 12
-DEPTH: Final = 3
+_FEW: Final = 12  # enum values, examples and optional members that are tried in one place
+DEPTH: Final = 3  # levels of a body whose members are varied
 LONG: Final = 5000
 # Names of members that take any text.
 _TEXTUAL: Final = frozenset({"name", "title", "label", "text", "note", "description", "comment", "message", "remark"})
@@ -29,8 +28,9 @@ _BEYOND: Final = 2**63
 #: Path into a body: names of members and indexes of items.
 Steps = tuple[str | int, ...]
 UNKNOWN: Final = "roaas-unknown"
-#: ACCEPT: the place of a variation that has other formats. NO_FORMAT: a media type that no device has.
+#: The place of a variation that has other formats.
 ACCEPT: Final = "header Accept"
+#: A media type that no device has.
 NO_FORMAT: Final = "application/x.roaas-nothing"
 _UNKNOWN_NUMBER: Final = 987_654_321
 # Texts that programs often mishandle; none of them makes a device act.

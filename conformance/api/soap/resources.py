@@ -45,12 +45,11 @@ _ITEMS: Final = 50
 _NUMBERS: Final = ("no", "nr", "num", "code")
 _REQUEST: Final = re.compile(r"\b(GET|PUT|POST|DELETE) (/[^\s,;]*)")
 _STATUS: Final = re.compile(r"(?:a refusal )?(?:with )?status (?:403|404|409)(?: or 410)?|\b(?:a refusal )?with 409")
-# What is found if a number reads as another one.
+# The found text of a finding in which a number was returned as another number.
 _NUMBER: Final = re.compile(r"-?[\d.e+-]+ as [\w.]+ instead of -?[\d.e+-]+(?: in \w+)*")
-# What is found if a time or a duration reads in another form, such as PT60S and PT1M. Below: what is expected of a
-# creation that led to an earlier thing.
+# The found text of a finding in which a time or a duration was returned in another form, such as PT1M for PT60S.
 _FORMS: Final = re.compile(r".{0,2}(?:P[\dT]|\d\d:\d\d).* as [\w.]+ instead of .{0,2}(?:P[\dT]|\d\d:\d\d).*")
-_TWICE: Final = "where an earlier thing is"
+_TWICE: Final = "where an earlier thing is"  # in the expected text if a creation returned the id of an earlier thing
 # Names of the values by which a success says that the operation failed, and their values if it did not.
 _RESULT: Final = re.compile(r"(?:error|result|return|status)(?:code|no|number)|err(?:no|or)|success|errormessage")
 _FINE: Final = frozenset({"", "0", "true", "1", "ok", "success", "none", "no error", "noerror"})

@@ -16,8 +16,8 @@ DECLARATIONS: Final = (
     "<?xml version='1.0' encoding='utf-8' standalone='yes'?>",
 )
 TEXTS: Final = ("plain", "cdata", "reference", "hexadecimal", "comment", "split", "comment inside")
-# _SECURITY: namespace of the `Id` attribute of signed messages (WS-Security 4.2); SOAP 1.1 4.1.1 lets the Envelope have
-# any qualified attribute.
+# Namespace of the `Id` attribute of signed messages (WS-Security 4.2); SOAP 1.1 4.1.1 lets the Envelope have any
+# qualified attribute.
 _SECURITY: Final = "http://docs.oasis-open.org/wss/2004/01/oasis-200401-wss-wssecurity-utility-1.0.xsd"
 _PREFIXES: Final = ("soapenv", "S", "SOAP-ENV", "_", "x.1-y")
 

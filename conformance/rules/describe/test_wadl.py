@@ -17,8 +17,7 @@ pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 _PATH = "/application.wadl"
 _BEHAVIOUR = "describe/wadl-behaviour"
 _IDS = ("describe/wadl", "describe/wadl-resources", _BEHAVIOUR)
-# _BESIDE: methods that a WADL may add to a resource's own, as Jersey does.
-_BESIDE = frozenset({"HEAD", "OPTIONS", ""})
+_BESIDE = frozenset({"HEAD", "OPTIONS", ""})  # methods that a WADL may add to a resource's own, as Jersey does
 _MEDIA_TYPES = {"application/vnd.sun.wadl+xml", "application/wadl+xml", "application/xml", "text/xml"}
 
 

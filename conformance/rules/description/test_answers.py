@@ -36,11 +36,10 @@ _OF_REQUEST = frozenset({405, 406, 415, 501})
 _OF_APPLICATION = frozenset({412, 415, 428})
 # Statuses by which a device says that it does not know what a request refers to.
 _NO_SUCH_THING = frozenset({400, 404, 409, 422})
-# _ASKED_FOR: statuses that only requests with one of the headers _ASKING get (RFC 9110 13, 14).
-_ASKED_FOR = frozenset({206, 304})
+_ASKED_FOR = frozenset({206, 304})  # statuses that only requests with one of the headers _ASKING get (RFC 9110 13, 14)
 _ASKING = frozenset({"range", "if-range", "if-match", "if-none-match", "if-modified-since", "if-unmodified-since"})
 _BAD_REQUEST, _FORBIDDEN, _NOT_FOUND = 400, 403, 404
-# Statuses by which frameworks refuse input, and say that a thing is not there.
+# Statuses with which frameworks refuse input, and statuses for a thing that does not exist.
 _OF_INPUT, _ABSENT = frozenset({400, 422}), frozenset({404, 410})
 _PLAIN = frozenset({Kind.USUAL, Kind.AGAIN, Kind.EXAMPLE, Kind.DEFAULT, Kind.ENUM, Kind.OPTIONAL})
 

@@ -47,7 +47,7 @@ _TOGETHER = re.compile(
 )
 _SENTENCE = re.compile(r"(?<=[.;])\s+")
 _SAID_OF_IT = re.compile(r": | is | has | should ")
-# What is extreme in a generated value: numbers beyond 32 bits, years of no calendar in use, empty texts, and control
+# Parts of a generated value that count as extreme: numbers beyond 32 bits, improbable years, empty texts, and control
 # characters, which JSON writes as \u00XX.
 _NUMBER, _LARGEST = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?"), 1 << 31
 _YEAR, _FIRST_YEAR, _LAST_YEAR = re.compile(r"\b(\d{4})-\d\d-\d\d"), 1970, 2100

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.needs("rest")
 # How long a robot may take to refuse octets that are no request before it counts as waiting for more, s.
 _THINK_S = 3.0
 _IN_ALL = 56
-# A device that has let this many deadlines pass is sent no more.
+# After this many timeouts, the device gets no further malformed requests.
 _SILENT = 2
 _HOST, _LENGTHS, _FORM = "web-server/host-invalid", "web-server/content-length-conflict", "web-server/target-form"
 _GARBAGE = (

@@ -55,8 +55,8 @@ def test_charset_in_accept(api: RestInterface, judge: Judge) -> None:
 
 # Accept-Encoding as clients send it, and as they exclude codings; after every other one the content is read without.
 _CODINGS = ("gzip, br", "deflate", "identity;q=0, gzip", "gzip;q=0", "*;q=0, identity", "identity", "br", "*")
-# Resources of which the largest are chosen; how many these are, beside the smallest.
-_CHOICE, _LARGE = 24, 4
+_CHOICE = 24  # resources that are read once, to compare their sizes
+_LARGE = 4  # the largest of them are tested, and the smallest
 
 
 @pytest.mark.requirement("http/content-coding", "http/accept-encoding")

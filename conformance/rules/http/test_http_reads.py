@@ -26,15 +26,15 @@ from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 _AVAILABLE, _MANY = "http/available", "http/many-requests"
-# Reads in the series; reads of each resource at standard effort.
-_IN_ALL, _EACH = 120, 60
+_IN_ALL = 120  # reads on one connection
+_EACH = 60  # reads of each resource at standard effort
 # Dropped requests that show a habit of the robot, and not just the end of an idle connection.
 _DROPS = 3
 # Time for reads that follow each other at once, s. If some fail, the robot is read again at the requirement's rate:
 # this many reads, at this interval, s.
 _FIRST_S = 3.0
 _READS, _EVERY_S = 100, 0.1
-# Reads, and interval, of a client that was told to slow down, s.
+# A client that gets 429 or 503 reads _SLOW_READS times, once each _SLOW_S, s.
 _SLOW_READS, _SLOW_S = 10, 1.0
 _LONGEST_WAIT_S = 10.0
 

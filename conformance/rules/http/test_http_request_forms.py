@@ -24,8 +24,8 @@ _LINES = (("Accept: image/png", "Accept: image/webp;q=0.5", "Accept: {}"), ("Acc
 # Time in which the connection must end after the response, s.
 _ENDS_S = 2.0
 _TRIES = 3
-# Pieces of a request, and the pause between two, s: together longer than any network would need.
-_PIECES, _APART_S = 12, 0.003
+_PIECES = 12  # pieces in which a request is sent
+_APART_S = 0.003  # pause between two pieces, s
 
 
 def _ask(api: RestInterface, path: str, *fields: str, cuts: tuple[int, ...] = ()) -> Attempt:

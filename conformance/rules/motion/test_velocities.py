@@ -17,7 +17,7 @@ from conformance.verdict.evidence import Case
 
 # Least share of its velocity at which the device must still drive within its hold time.
 _STILL_DRIVES = 0.5
-# Time that a velocity may hold beyond its hold time: as a share of it, and s.
+# A velocity may continue after its hold time for this share of it, plus this time, s.
 _LONGER, _LONGER_S = 0.4, 0.25
 _NO_HOLD = NotClaimed("the map declares no hold_s: the device goes on until it is told otherwise")
 # Time after which a device that a refusal stops is seen to be slower, s.

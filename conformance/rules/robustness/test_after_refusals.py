@@ -25,10 +25,10 @@ from conformance.verdict.evidence import Judge
 pytestmark = [pytest.mark.phase("acting"), pytest.mark.needs("rest")]
 _ID = "robustness/recovers"
 _TEXT = "text/plain"
-# Statuses that a valid read may get for another reason than the request before it.
+# Statuses that a valid read may get regardless of the refused request before it.
 _OTHERWISE = frozenset({401, 403, 404, 409, 410, 423, 429, 503})
 _OK, _REDIRECTED = 200, 400
-# Wait for a server that keeps the connection open and does not read on, s; number of waits.
+# A server may keep the connection open without reading: the suite waits _WAITS times for _THINK_S, s.
 _THINK_S, _WAITS = 3.0, 2
 
 

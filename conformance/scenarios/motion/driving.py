@@ -12,18 +12,16 @@ from conformance.scenarios.motion.room import MEASURABLE, Span
 from conformance.scenarios.motion.trace import Reading, middle_of
 from conformance.scenarios.scenario import NotPossibleError
 
-# _BACK_SHARE: share of the limit at which the device drives back. _BACK_S: longest time for that, s.
-_BACK_SHARE: Final = 0.4
-_BACK_S: Final = 20.0
+_BACK_SHARE: Final = 0.4  # share of the limit at which the device drives back
+_BACK_S: Final = 20.0  # longest time for driving back, s
 # How often the device is brought to where it has room.
 _TRIES: Final = 3
 # How long a slow drive lasts that shows which axes it changes, s.
 _LEARNED_S: Final = 0.5
 # Tolerances by which a device that is driven back goes the wrong way.
 _WRONG: Final = 2
-# _TURNS: how often a device is turned at most to find a way back. _ALONG: share of its way that is along an axis then.
-_TURNS: Final = 8
-_ALONG: Final = 0.5
+_TURNS: Final = 8  # most turns of a device to find a way back
+_ALONG: Final = 0.5  # share of its velocity that must be along an axis after such a turn
 
 
 def with_room(

@@ -36,12 +36,12 @@ STAYS_S: Final = 0.3
 _PACE_S: Final = 0.02
 # The deadline of a stop, s.
 _STOP_S: Final = 2.0
-# How long, and how often, a move is sent again while the device finishes the one before, s.
+# A move that the device refuses while it finishes the one before is sent again, for _FINISHES_S, once each _AGAIN_S, s.
 _FINISHES_S, _AGAIN_S = 1.0, 0.05
 # How long a device gets for moves one after the other, s.
 _QUEUE_S: Final = 20.0
-# _LINK_S: how long responses are watched, s. _SLOWER: times that a later one may be slower than those.
-_LINK_S, _SLOWER = 2.0, 3.0
+_LINK_S = 2.0  # for how long responses are timed again, s
+_SLOWER = 3.0  # an earlier response counts as at most this many times slower than those
 # How long a device without positions gets to come to rest, s.
 _RESTS_S: Final = 5.0
 

@@ -31,16 +31,13 @@ TRIES: Final = 3
 # most _AT_MOST_S, s.
 _AT_LEAST_S: Final = 1.5
 _AT_MOST_S: Final = 5.0
-# _LONGER_S: time added to that of a displaced move, s; _LONGEST_S: where its own resource is read, as a device ends a
-# move a while after it is there. _COMMANDS: moves in a row.
-_LONGER_S, _LONGEST_S = 0.5, 1.5
-_COMMANDS: Final = 100
+_LONGER_S = 0.5  # time added to that of a move which another move replaces, s
+_LONGEST_S = 1.5  # the same where the move's own resource is read: a device ends a move a while after it arrives, s
+_COMMANDS: Final = 100  # moves in a row
 # A velocity with a longer hold time is always ended by a stop, s.
 _SHORT_HOLD_S: Final = 2.0
-# Factor on the time of the first move, computed from its finished part. _SET_OUT: share of that part from which on it
-# counts, as a device may have to turn before it sets out.
-_SURELY: Final = 1.5
-_SET_OUT: Final = 0.1
+_SURELY: Final = 1.5  # factor on the time that the finished part of the first move predicts for the whole
+_SET_OUT: Final = 0.1  # the part before this share does not count, as a device may have to turn before it sets out
 # Length of a way that is long enough for a stop under way, in tolerances.
 _LONG: Final = 12
 # How far beyond the limits forbidden targets lie, as shares of an axis's range.

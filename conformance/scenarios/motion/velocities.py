@@ -39,9 +39,8 @@ _UNDECLARED_S: Final = 2.0
 MEASURED_S: Final = 0.5
 # How much longer it is measured at most, where a slow link or machine leaves too few readings, s.
 _LONGER_S: Final = 2.0
-# _SLOW: slow velocity, as a share of the limit. _SLOWEST: the slowest.
-_SLOW: Final = 0.4
-_SLOWEST: Final = 0.1
+_SLOW: Final = 0.4  # slow velocity, as a share of the limit
+_SLOWEST: Final = 0.1  # slowest velocity, as a share of the limit
 # A velocity differs from rest by this multiple of its tolerance.
 _TOLD: Final = 1.5
 # Successive velocities before the device is stopped; at quick effort, all of them.
@@ -53,9 +52,8 @@ _LONGEST_HOLD_S: Final = 2.0
 _REFUSED_AT: Final = (0.1, 0.9)
 #: Part of the hold time in which the device must still drive.
 HELD: Final = (0.2, 0.7)
-# _KEPT: renewals of a velocity within its hold time. _KEPT_S: longest time between two, s.
-_KEPT: Final = 3
-_KEPT_S: Final = 0.1
+_KEPT: Final = 3  # renewals of a velocity within its hold time
+_KEPT_S: Final = 0.1  # longest time between two renewals, s
 # To save room, a device that is not stopped may begin at this share of the velocity.
 _SLOWER: Final = 0.7
 # How long a device is watched after the time to rest, s.

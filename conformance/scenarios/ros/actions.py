@@ -24,12 +24,10 @@ from conformance.transport.exchange import Exchange
 
 _NEEDS: Final = (Need.REST,)
 _PACE_S: Final = 0.06
-# _GAP_S: pause between two feedbacks. _RUNS_S: how long a goal runs before it is cancelled, s.
-_GAP_S, _RUNS_S = 0.6, 0.3
-# _GOES_ON_S: how long a goal runs on that refuses its cancellation, or that runs beside another, s. _FEEDBACKS: their
-# number.
-_GOES_ON_S: Final = 1.5
-_FEEDBACKS: Final = 3
+_GAP_S = 0.6  # pause between two feedbacks, s
+_RUNS_S = 0.3  # how long a goal runs before it is cancelled, s
+_GOES_ON_S: Final = 1.5  # how long a goal runs on that refuses its cancellation, or that runs beside another, s
+_FEEDBACKS: Final = 3  # feedbacks that a goal sends
 _PARTS: Final = ("Goal", "Result", "Feedback")
 # Reads of a goal after its end.
 _AFTERWARDS: Final = 3

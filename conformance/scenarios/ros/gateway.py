@@ -32,10 +32,11 @@ _Operation = TypeVar("_Operation")
 CROWD: Final = 32
 # Pause between two reads of the gateway, s.
 PACE_S: Final = 0.03
-#: PATIENCE_S: additional time for a busy machine to show the last messages, s. _DISCOVERY_S: to discover the graph, s.
-#: _ALONE_S: how long it is heard whether another robot publishes, s.
+#: Additional time for a busy machine to show the last messages, s.
 PATIENCE_S: Final = 10.0
+#: Longest wait for the discovery of the graph, s.
 _DISCOVERY_S: Final = 15.0
+#: How long the suite listens whether another robot publishes, s.
 _ALONE_S: Final = 1.2
 _KEYS: Final[dict[type, str]] = {kind: name for name, kind in KINDS.items()}
 #: What of a type an operation is sent.

@@ -28,12 +28,10 @@ _DOUBLES: Final = (
     123456789.12345679, 4.35, 2.0,
 )  # fmt: skip
 _SINGLES: Final = (0.1, 3.4028234663852886e38, 1.401298464324817e-45, -0.0, 1 / 3, -16777215.0, 1e-7, 123456.789, 2.0)
-# _LINES: characters that XML cannot write as they are. _ITEMS: lengths of arrays.
-_LINES: Final = ("\u2028", "\n", "\t")
-_ITEMS: Final = (3, 0, 1, 7)
-# _INNER: most messages in an array inside a message. _SECONDS: greatest time, s.
-_INNER: Final = 2
-_SECONDS: Final = 2**31 - 1
+_LINES: Final = ("\u2028", "\n", "\t")  # characters that XML cannot write as they are
+_ITEMS: Final = (3, 0, 1, 7)  # lengths of the arrays that are sent
+_INNER: Final = 2  # most messages in an array inside a message
+_SECONDS: Final = 2**31 - 1  # greatest time, s
 _NANOSECONDS: Final = 999_999_999
 # Octets for each number of a large message.
 _OCTETS: Final = 100

@@ -33,20 +33,18 @@ _SLOW: Final = 0.2
 _MORE_S: Final = 0.15
 # How much later than declared a response may come, s.
 _LATE_S: Final = 2.0
-#: ROUNDS: tries if other clients are held up, because once may be chance. _BESIDE: reads beside a call.
+#: Tries if a call delays other clients, because a single delay may be chance.
 ROUNDS: Final = 2
+#: Reads during a call.
 _BESIDE: Final = 4
 # A request is held up if it takes _HELD_S, s, and _HELD times its usual time.
 _HELD_S, _HELD = 0.8, 5.0
 # A request that a call holds up ends at most this long before the call's response, s.
 _TOGETHER_S: Final = 0.25
-# _OVERTAKEN_S: how much earlier every second concurrent call is answered, s. _FEW: of these at quick. _CALLS: calls
-# with values of their own.
-_OVERTAKEN_S: Final = 0.1
-_FEW: Final = 4
-# _ROW: calls in a row that show whether clients are never closed.
-_CALLS: Final = {"quick": 3, "standard": 6, "deep": 24}
-_ROW: Final = {"quick": 10, "standard": 20, "deep": 1000}
+_OVERTAKEN_S: Final = 0.1  # every second concurrent call is answered this much earlier than the others, s
+_FEW: Final = 4  # concurrent calls at quick
+_CALLS: Final = {"quick": 3, "standard": 6, "deep": 24}  # calls, each with values of its own
+_ROW: Final = {"quick": 10, "standard": 20, "deep": 1000}  # calls in a row that show whether clients are never closed
 
 
 class Server(StrEnum):

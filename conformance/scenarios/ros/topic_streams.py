@@ -26,7 +26,7 @@ from conformance.verdict.effort import Effort
 _IN_A_ROW: Final = 8
 _GAP_S: Final = 0.02
 _ROUNDS: Final = {"quick": 2, "standard": 3, "deep": 8}
-# A throttled stream is fed for so many of its intervals, by so many messages in each.
+# The suite publishes to a throttled stream for _INTERVALS of its intervals, _IN_EACH messages in each.
 _INTERVALS, _IN_EACH = 4, 5
 # That of a rosbridge, s.
 _THROTTLE_S: Final = 0.2

@@ -27,7 +27,7 @@ from conformance.statement.ros_map import Body, Calls, RosMap
 from conformance.transport.exchange import Attempt, Exchange
 
 _SHOWN: Final = 80
-#: A request that fails after longer than that, ms, is sent so often, as its deadline may have passed.
+#: A request that fails after more than _SOON_MS may have timed out on a busy machine: it is sent up to TRIES times.
 _SOON_MS, TRIES = 1000.0, 3
 _UUID: Final = 16
 #: What non-finite numbers are as strings: in JSON by the map, in XML by XML Schema (3.2.5).

@@ -150,7 +150,7 @@ _LASTING = frozenset({"hang", "slower"})
 _REPEATING = frozenset({"freeze", "delay", "ignore", "lag", "crossed"})
 # Larger messages are attacks by their size, and no generated fault concerns size.
 _LARGEST: Final = 100_000
-# _OF_TIME: conditions that depend on the clock or on other requests, not on one message.
+# Conditions that depend on the clock or on other requests, not on one message.
 _OF_TIME: Final = frozenset({"now-and-then", "after-pause", "together"})
 Message = tuple[Request, Response]
 

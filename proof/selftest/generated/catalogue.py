@@ -89,7 +89,7 @@ def of_lenience(place: Place, known: frozenset[str]) -> Iterator[GeneratedMutant
 
 
 _NULL = next(operator for operator in OPERATORS if operator.name == "null")
-# _WHOLE: changes of whole responses that strike now and then.
+# Changes of whole responses that strike now and then.
 _WHOLE = {"crossed": responses.cross_responses, "failing": responses.failing, "cut": responses.cut}
 _UNSAFE = ("PUT", "POST", "PATCH", "DELETE")
 #: What norms leave open, whatever the contract.

@@ -22,7 +22,7 @@ from proof.mutation.messages import Change, Forward, Request, Response
 from proof.selftest.generated.mutant import GeneratedMutant, Tally
 from proof.selftest.generated.places import Exchange
 
-#: NOTHING: stands for a missing value.
+#: Stands for a missing value.
 NOTHING = object()
 _INPUT_DEPTH = 3
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")
@@ -140,9 +140,8 @@ def _members(schema: Schema, steps: tuple[str, ...]) -> Iterator[Input]:
                 yield from _members(flatter, (*steps, name))
 
 
-# _RIGHT: lists after which a total becomes wrong and stays so. _DEPTH: of nested members.
-_RIGHT = 10
-_DEPTH = 2
+_RIGHT = 10  # number of right lists, after which the mutant's total is always wrong
+_DEPTH = 2  # depth of nested members
 _Differs = Callable[[Page, Page], bool]
 _SUCCESS, _REFUSED, _NO_TYPE = range(200, 300), range(400, 500), 415
 # What a mutant does with a request to an item. Arguments: request, response, another item, and a way to the device.

@@ -12,9 +12,9 @@ from proof.selftest.generated.mutant import SUCCESS, Alter, GeneratedMutant, Tal
 from proof.selftest.generated.places import Exchange
 
 _BAD_REQUEST = 400
-# _HANGS_S: how long a hanging mutant waits, s: longer than a request's deadline. _LATER_S: delay after each request.
-# _LATEST_S: longest delay.
-_HANGS_S, _LATER_S, _LATEST_S = 30.0, 0.002, 0.4
+_HANGS_S = 30.0  # how long a hanging mutant waits, s: longer than any deadline of a request
+_LATER_S = 0.002  # delay that each request adds, s
+_LATEST_S = 0.4  # longest delay, s
 _TRACEBACK = json.dumps(
     'Traceback (most recent call last):\n  File "/srv/device/app/handlers.py", line 83, in handle\n    '
     "value = table[key]\nKeyError: 'speed'\n"

@@ -22,8 +22,8 @@ _SUCCESS, _REFUSED = range(200, 300), range(400, 500)
 _NOT_ACCEPTABLE, _FAILED, _UNSUPPORTED, _REQUIRED, _PART, _CURRENT = 406, 412, 415, 428, 206, 304
 _WRITING = frozenset({"PUT", "PATCH", "DELETE"})
 _OCTETS, _CSV, _KEY = "application/octet-stream", "text/csv", "Idempotency-Key"
-# Resources that are tried; decimals that are kept.
-_TRIED, _DECIMALS = 3, 2
+_TRIED = 3  # resources that are tried
+_DECIMALS = 2  # decimals that the mutant keeps
 
 
 @dataclass

@@ -17,15 +17,14 @@ from proof.selftest.generated.operators import Operator
 from proof.selftest.generated.places import Exchange, Place
 from proof.selftest.generated.slots import edit_message
 
-# RARE: one exchange in so many. ERROR: first status of an error. Modes of a mutant use both too.
-RARE: Final = 20
+RARE: Final = 20  # a rare fault strikes one exchange in this many
+# Statuses from this one on are errors.
 ERROR: Final = 400
 SUCCESS: Final = range(200, 300)
 _FROM: Final = 30
 _PAUSE_S: Final = 1.0
-# _SPELL_S: last seconds of each period in which a fault strikes. _OF_S: length of the period, s.
-_SPELL_S: Final = 2.0
-_OF_S: Final = 10.0
+_SPELL_S: Final = 2.0  # last seconds of each period in which a fault strikes
+_OF_S: Final = 10.0  # length of each period, s
 _SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _LONG: Final = 40
 _SMALL: Final = 0.1

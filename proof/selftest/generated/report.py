@@ -13,8 +13,7 @@ from proof.selftest.generated.adversary import Rate, group_of, rate_of, rates_by
 from proof.selftest.generated.catalogue import every_change, generated_mutants, open_place, open_places
 from proof.selftest.generated.judging import BROKEN, GIVEN_UP, KILLED, NOT_REACHED, SURVIVED, GeneratedResult
 
-# _WRITTEN: word of roaas-selftest/1 for a killed mutant.
-_WRITTEN = {KILLED: "caught"}
+_WRITTEN = {KILLED: "caught"}  # the format roaas-selftest/1 says "caught" for a killed mutant
 _KEYS = ("class", "clause", "operation", "when", "operator", "effort")
 _COUNTED = frozenset({KILLED, SURVIVED})
 # False alarms of a tool that the table names.

@@ -14,8 +14,7 @@ from lxml import etree
 from proof.mutation.messages import Request, Response
 from proof.selftest.generated.places import ITEM, Place
 
-# _AGAIN: prefix for the name of a member that is written twice.
-_AGAIN = "@again@"
+_AGAIN = "@again@"  # prefix for the name of a member that is written twice
 _NUMERIC = {"number", "integer"}
 
 

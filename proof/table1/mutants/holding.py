@@ -17,8 +17,8 @@ _mutant = MUTANTS.of_class("safety", "rest")
 
 _PUT, _PUT_LINEAR, _PUTS = rest("PUT", VELOCITY), rest("PUT", LINEAR), rest("PUT", VELOCITY, LINEAR)
 _DELETE, _PUT_GOAL, _POST = rest("DELETE", GOAL), rest("PUT", GOAL), rest("POST", VELOCITY)
-# _SILENT_S: silence after which no client counts as reading, s. _LOOK_S: pause between looks, s.
-_SILENT_S, _LOOK_S = 0.12, 0.04
+_SILENT_S = 0.12  # silence after which no client counts as reading, s
+_LOOK_S = 0.04  # pause between looks, s
 
 
 class Remembering:

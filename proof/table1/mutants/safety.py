@@ -19,8 +19,7 @@ _mutant = MUTANTS.of_class("safety", "rest")
 _PUT = rest("PUT", VELOCITY)
 _PUTS = rest("PUT", VELOCITY, LINEAR)
 _PUT_GOAL, _DELETE = rest("PUT", GOAL), rest("DELETE", GOAL)
-# _EVERY_S: pause after which a mutant that drives on repeats the velocity, s.
-_EVERY_S = 0.15
+_EVERY_S = 0.15  # pause after which a mutant that drives on repeats the velocity, s
 _AXES = (("linear", "y"), ("linear", "z"), ("angular", "x"), ("angular", "y"))
 
 

@@ -25,15 +25,14 @@ from conformance.papers_robot.delivery import COFFEE, COORDINATES, MESSAGE_FIELD
 from conformance.transport.exchange import Attempt, Exchange, Request
 from conformance.verdict.evidence import Case, case
 
-# _MANY: accepted deliveries that may wait until the list is read. _WAITS_S: longest wait of the oldest, s.
-_MANY: Final = 10
-_WAITS_S: Final = 1.0
+_MANY: Final = 10  # accepted deliveries that may wait until the list is read
+_WAITS_S: Final = 1.0  # longest wait of the oldest, s
 # Fewest deliveries that the list has to hold.
 _HELD: Final = 50
 # Earlier lists that are remembered, because several clients may read the list at once.
 _LISTS: Final = 8
-# _LARGE: longer messages are not read, bytes. _OPERATIONS: SOAP operations that deliver.
-_LARGE: Final = 100_000
+_LARGE: Final = 100_000  # longer messages are not read, bytes
+# SOAP operations that deliver.
 _OPERATIONS: Final = {clark(NAMESPACE, f"Execute{name}Request"): name == "Coffee" for name in ("Coffee", "Delivery")}
 
 

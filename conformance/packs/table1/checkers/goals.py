@@ -22,8 +22,7 @@ _MOST: Final = 0.5
 _AT_FIRST: Final = 2
 # Readings that show a swap of goals: one value, another, and the first again.
 _SHOWN: Final = 3
-# _PROGRESS: prefix of the members that change as a goal advances.
-_PROGRESS: Final = "status."
+_PROGRESS: Final = "status."  # prefix of the members that change as a goal advances
 Shown = dict[str, Any]
 
 

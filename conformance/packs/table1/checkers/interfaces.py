@@ -20,14 +20,12 @@ from conformance.packs.table1.robot.state_read import entries_of, value_in
 from conformance.transport.exchange import SAFE_METHODS, Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
-# _OFTEN: how often an interface must lag behind the other. _BEHIND_S: how long after a change it may lag, s.
-_OFTEN: Final = 2
-_BEHIND_S: Final = 0.5
+_OFTEN: Final = 2  # how often an interface must lag behind the other to fail
+_BEHIND_S: Final = 0.5  # how long after a change an interface may lag, s
 _XML: Final = "application/xml"
 _LARGE: Final = 100_000
-# _UNREAD: marks a value that was not read yet. _THERE: marks one that only HEAD showed.
-_UNREAD: Final = object()
-_THERE: Final = object()
+_UNREAD: Final = object()  # marks a value that was not read yet
+_THERE: Final = object()  # marks a value that exists, as a HEAD showed, and was not read
 _HEAD: Final = "http/head"
 
 

@@ -23,11 +23,9 @@ _LEAP_M: Final = 1.0
 _STEPS: Final = 4.0
 # A leap aside and back ends within this share of the leap from where it began.
 _BACK: Final = 0.5
-# _FAR_M: greater coordinates are too inexact to compare. _NEAR_M: smaller tolerances are not judged. Below: default
-# tolerance, m.
-_FAR_M: Final = 1e4
-_NEAR_M: Final = 0.01
-_TOLERANCE_M: Final = 0.1
+_FAR_M: Final = 1e4  # greater coordinates are too inexact to compare
+_NEAR_M: Final = 0.01  # declared tolerances below this are not judged, m
+_TOLERANCE_M: Final = 0.1  # default tolerance, m
 _FRAME: Final = "map"
 _YAW_OFF_RAD: Final = 0.2
 _ROUNDING_M: Final = 1e-6
@@ -45,9 +43,8 @@ _JUDGED: Final = {
 }
 # Poses that a path needs to show its usual step.
 _FEWEST: Final = 6
-# _STANDS_M: a robot that moves less than this stands still, m. _OFTEN: plans that must start elsewhere.
-_STANDS_M: Final = 0.02
-_OFTEN: Final = 2
+_STANDS_M: Final = 0.02  # a robot that moves less than this stands still, m
+_OFTEN: Final = 2  # plans that must start elsewhere to count as a failure
 
 
 class Plans:

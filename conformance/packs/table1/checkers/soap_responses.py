@@ -33,8 +33,7 @@ from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
 _IDS: Final = {"publishers": "soap-delivery/response-valid", "subscribers": "soap-subscribers/response-valid"}
-# _LARGE: longer plans are judged only by the check that requests them, bytes.
-_LARGE: Final = 100_000
+_LARGE: Final = 100_000  # longer plans are judged only by the check that requests them, bytes
 _SUFFIX: Final = "Response"
 #: By operation: the requirement and the shape of its content.
 _CONTENT: Final[Mapping[str, tuple[str, Shape]]] = {

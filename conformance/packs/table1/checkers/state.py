@@ -225,17 +225,14 @@ _AROUND: Final = 2
 _NEIGHBOURS: Final = 1.5
 # Wrong readings needed: runs with good robots, even noisy ones, had none.
 _SEVERAL: Final = 2
-# _OUT: a reading is wrong if it is off by this many tolerances.
-_OUT: Final = 1.5
+_OUT: Final = 1.5  # a reading is wrong if it is off by this many tolerances
 _LAPSES: Final = 50
 # Readings of one message that show a swap: one value, another, and the first again.
 _TOLD: Final = 3
 # Greatest difference between two responses by rounding, m, rad, m/s and rad/s.
 _ABSOLUTE: Final = 0.02
-# _PLACE_M: how far off a pose may be, m. _HEADING: how far off a heading, as a vector: a robot may turn between two
-# samples.
-_PLACE_M: Final = 0.05
-_HEADING: Final = 0.2
+_PLACE_M: Final = 0.05  # error that a pose may have, m
+_HEADING: Final = 0.2  # error of a heading, as a vector: a robot may turn between two samples
 
 
 class OneSample:

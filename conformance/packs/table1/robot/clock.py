@@ -11,9 +11,8 @@ SPAN_S: Final = 5.0
 # One reading per _EVERY_S is kept, at most _MOST; when there are more, every other one is dropped.
 _EVERY_S: Final = 0.1
 _MOST: Final = 80
-# _SHARE: error that the rate may have. _OLDER_S: how much older than usual a stamp may be when it is read, s.
-_SHARE: Final = 0.05
-_OLDER_S: Final = 0.05
+_SHARE: Final = 0.05  # error that the clock's rate may have
+_OLDER_S: Final = 0.05  # a stamp may be this much older than usual when it is read, s
 # Fractions of a second are judged by _FINE readings, two of which are _NEAR_S apart, s.
 _FINE: Final = 60
 _NEAR_S: Final = (0.2, 0.45)

@@ -13,9 +13,8 @@ from conformance.packs.table1.robot.robot import ACCEPT_JSON, DELIVERIES
 from conformance.packs.table1.statement import said_of
 from conformance.transport.client import Connection, HttpClient
 
-# QUIET_S: how long the suite waits for another message after the last one, s. _STEP_S: pause between two looks, s.
-QUIET_S: Final = 0.15
-_STEP_S: Final = 0.02
+QUIET_S: Final = 0.15  # how long the suite waits for another message after the last one, s
+_STEP_S: Final = 0.02  # pause between two looks, s
 # Pause between two reads of the list while a delivery is awaited, s.
 _AGAIN_S: Final = 0.1
 

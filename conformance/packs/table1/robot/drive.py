@@ -389,11 +389,9 @@ def direction(robot: Robot) -> int:
     return 1 if pose is None or not robot.reverses or robot.in_arena(pose.ahead(robot.limits.linear_m_s)) else -1
 
 
-# _SLOW: slow velocity, as a share of its limit. _TOLD: as a multiple of what may pass for rest. Below: at most this
-# share.
-_SLOW: Final = 0.1
-_TOLD: Final = 4
-_MOST: Final = 0.6
+_SLOW: Final = 0.1  # slow velocity, as a share of its limit
+_TOLD: Final = 4  # a velocity is seen if it is this many times the greatest one that counts as rest
+_MOST: Final = 0.6  # greatest velocity of a drive, as a share of its limit
 
 
 def unrenewed_velocities(

@@ -43,9 +43,8 @@ from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
-# _SHORTEST: shortest drive that is judged, m. _LEAST_TURN: smallest turn, rad.
-_SHORTEST: Final = 0.08
-_LEAST_TURN: Final = 0.2
+_SHORTEST: Final = 0.08  # shortest drive that is judged, m
+_LEAST_TURN: Final = 0.2  # smallest turn that is judged, rad
 # Fewest readings to sum: one step says nothing.
 _FEWEST: Final = 3
 # Difference allowed between the summed velocity and the distance: _SHARE of it, plus _OFF m; below, rad.
@@ -56,9 +55,8 @@ _OFF_TURN: Final = 0.06
 _MOVES: Final = 0.25
 # Between readings farther apart than this, s, a velocity may have ended and begun again: its sum is a guess.
 _FINE_S: Final = 0.25
-# _WINDOW: share of the way in one window. _NOISES: noise at its ends, as a multiple for the whole way.
-_WINDOW: Final = 0.25
-_NOISES: Final = 8.0
+_WINDOW: Final = 0.25  # share of the way that each window covers
+_NOISES: Final = 8.0  # factor on the position's noise in the tolerance for a whole way
 # The velocity is unknown in a gap between readings longer than _HELD_UP_S and _HELD_UP_TIMES the usual gap.
 _HELD_UP_S: Final = 0.5
 _HELD_UP_TIMES: Final = 3.0
@@ -283,7 +281,7 @@ _STEADY_S: Final = 0.3
 _IN_A_ROW: Final = 5
 # Rounds of readings to judge: more than any window has.
 _LOOKED_AT: Final = 200
-#: ECHO: texts of the same double differ by less than this, whatever tolerance is declared.
+#: Texts of the same double differ by less than this, whatever tolerance is declared.
 ECHO: Final = 1e-9
 _OUTLASTED: Final = NotTested("a response takes so long that a velocity ends before it is read")
 _RESOURCES: Final = "rest-resources"

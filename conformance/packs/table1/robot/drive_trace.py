@@ -21,9 +21,9 @@ from conformance.verdict.evidence import Case
 ALL, LINEAR_PART, ANGULAR_PART = slice(None), slice(0, 3), slice(3, 6)
 #: Assumed hold time of a velocity where none is declared, s.
 COUNTED_ON_S: Final = 0.5
-#: JUDGED: share of the hold time in which a velocity is judged. _COUNTED_ON: share that a client relies on if it still
-#: has to send.
+#: Share of the hold time in which a velocity is judged.
 JUDGED: Final = 0.95
+#: Share of the hold time after which a client that keeps driving must have sent the next velocity.
 _COUNTED_ON: Final = 0.9
 _LATE_S: Final = 0.02
 

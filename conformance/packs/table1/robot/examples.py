@@ -9,7 +9,7 @@ from conformance.packs.table1.robot.plan import ask, reachable
 from conformance.packs.table1.robot.robot import Robot, Velocity, drivable
 from conformance.packs.table1.statement import Statement
 
-# _FAR_M: far enough to be under way for a while, near enough for every room; the second where room is short.
+# Far enough to be under way for a while, near enough for every room; the second where room is short.
 _FAR_M = (1.5, 0.5)
 _SLOW_M_S = 0.1
 # Offset that gives coordinates many digits, m: whole numbers would not show that a robot rounds.

@@ -18,7 +18,7 @@ NEW: Final = frozenset({201, 202})
 REPEATED: Final = frozenset({200, 202, 204})
 # Statuses for a cancelled goal: the contract has 204, and a response with a body means the same.
 CANCELLED: Final = frozenset({200, 202, 204})
-# RATHER_XML: an Accept header with a preference, which must not matter for cancelling.
+# An Accept header with a preference, which must not matter for cancelling.
 RATHER_XML: Final = ("Accept", "application/xml, */*;q=0.1")
 SUCCEEDED: Final = 4
 CANCELED: Final = 5
@@ -148,9 +148,8 @@ _CIRCLE: Final = 2.2
 _PLACES: Final = 8
 # Distances at which free places are looked for, m: the nearest first, because the way takes time.
 _DISTANCES_M: Final = (0.3, 0.5, 0.8, 1.5, 2.5)
-# _FARTHEST_M: distance of a goal that must last, m. _ATTEMPTS: tries to be in time.
-_FARTHEST_M: Final = 1.5
-_ATTEMPTS: Final = 3
+_FARTHEST_M: Final = 1.5  # distance of a goal that must stay active for a while, m
+_ATTEMPTS: Final = 3  # goals that are sent until `act` was in time for one
 # Difference between the headings of goals in a series, rad.
 _TURN_RAD: Final = 0.37
 # How long the suite waits for a robot that makes room, s.

@@ -52,8 +52,7 @@ TWIST: Final = Shape(_answer_of("getVelocity"))
 VECTOR3: Final = Shape(_answer_of("getLinearVelocity"))
 GET_PLAN: Final = Shape(_answer_of("getPlan"))
 DELIVERIES: Final = Shape(_answer_of("getDeliveries"))
-# GOAL: shape of a goal without its status, which has a requirement of its own.
-GOAL: Final = Shape(_without(_GOAL, "status"))
+GOAL: Final = Shape(_without(_GOAL, "status"))  # shape of a goal without its status, which has a requirement of its own
 GOAL_POSE: Final = Shape(_GOAL["properties"]["goal"]["properties"]["target_pose"]["properties"]["pose"])
 STATUS: Final = Shape(_GOAL["properties"]["status"])
 GOAL_AND_STATUS: Final = Shape(_GOAL)

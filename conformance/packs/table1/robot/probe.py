@@ -16,13 +16,11 @@ from ros_probe.process import ProbeError, RosProcess
 #: every 3 s.
 ARRIVES_S: Final = 5.0
 
-# _EYES: what the probe observes.
-_EYES: Final = ("deliveries", "velocities")
+_EYES: Final = ("deliveries", "velocities")  # topics that the probe observes
 _NS: Final = 1_000_000_000
-# Wait for the robot's discovery, and pause between two looks at the graph, s.
-_DISCOVERY_S, _STEP_S = 10.0, 0.05
-# _MATCHED_S: time after which both ends know of a subscription, s.
-_MATCHED_S: Final = 0.2
+_DISCOVERY_S = 10.0  # longest wait until the probe discovers the robot, s
+_STEP_S = 0.05  # pause between two looks at the ROS graph, s
+_MATCHED_S: Final = 0.2  # time after which both ends know of a subscription, s
 _DELIVERY: Final = "mybot_delivery_app/msg/DeliveryRequestMsg"
 _TWIST, _STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 

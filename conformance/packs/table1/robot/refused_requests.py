@@ -38,33 +38,27 @@ from conformance.transport.client import HttpClient
 from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener, Request, Response
 from conformance.verdict.effort import Effort
 
-# _WRONG: statuses for a request that is wrong in every state, regardless of sender, size or rate. _FAULTS: the same in
-# SOAP.
+# Statuses for a request that is wrong in every state, regardless of sender, size or rate.
 _WRONG: Final = frozenset({400, 404, 405, 406, 415, 422})
-_FAULTS: Final = frozenset({"Client", "MustUnderstand", "VersionMismatch"})
-# _SPECIAL: headers that change the framing of a request or its later meaning.
+_FAULTS: Final = frozenset({"Client", "MustUnderstand", "VersionMismatch"})  # the same as fault codes of SOAP
+# Headers that change the framing of a request or its later meaning.
 _SPECIAL: Final = frozenset({"transfer-encoding", "expect", "range", "idempotency-key", "if-match", "if-none-match"})
 _OF_THE_CLIENT: Final = frozenset({"host", "content-length", "connection"})
-# _LARGEST: bytes of a request that is kept; checks of their own send larger ones and attacks. _LONGEST: characters of a
-# target.
-_LARGEST: Final = 8192
-_LONGEST: Final = 1024
+_LARGEST: Final = 8192  # longest request that is kept, bytes: other checks test larger ones
+_LONGEST: Final = 1024  # longest target, characters
 _ATTACKS: Final = (b"<!DOCTYPE", b"<!ENTITY", b"XInclude")
-# _DETAIL, _VALUES: reduce a refusal to its words, by which kinds of faults are told apart.
+# The words of a refusal show its kind of fault: these find where they start, and the values to remove from them.
 _DETAIL: Final = re.compile(r"detail\W+|faultstring\W*")
 _VALUES: Final = re.compile(r"'[^']*'|\d+")
 _KIND: Final = 48
-# _MOST: requests of one operation that are kept. _ALIKE: requests with one kind of fault.
-_MOST: Final = 400
-_ALIKE: Final = 2
-# _BEYOND: a velocity that every robot refuses; below, a delivery.
-_BEYOND: Final = Velocity(angular_z=1e4)
+_MOST: Final = 400  # requests of one operation that are kept
+_ALIKE: Final = 2  # requests that are kept for each kind of fault
+_BEYOND: Final = Velocity(angular_z=1e4)  # a velocity that every robot refuses
 #: A frame that no robot knows.
 NO_FRAME: Final = "no_such_frame"
 _NO_NUMBER: Final = ("3", "1", "2", "3", "4", "5", "abc")
-# _COUNTS: requests sent again to a fast robot, by effort. _FEWEST: at least.
-_COUNTS: Final = {"quick": 60, "standard": 300}
-_FEWEST: Final = 8
+_COUNTS: Final = {"quick": 60, "standard": 300}  # requests sent again to a fast robot, by effort
+_FEWEST: Final = 8  # requests that are sent again to a slow robot
 # Longest time for these requests if --request-rate limits them, s.
 _LONGEST_S: Final = 0.5
 # By rank of an operation: kinds of fault to send before the next kinds of all operations.

@@ -26,15 +26,12 @@ from conformance.transport.pace import Hangs, Pace
 
 # How long a cancellation is repeated, s: a robot with a queue of missions starts the next one.
 _CANCEL_S: Final = 3.0
-# _GRACE_S: time beyond the settle time, for a loaded machine and a distant network, s. _STEP_S: pause between two
-# reads, s.
-_GRACE_S: Final = 1.5
-_STEP_S: Final = 0.02
+_GRACE_S: Final = 1.5  # time beyond the settle time, for a loaded machine and a distant network, s
+_STEP_S: Final = 0.02  # pause between two reads, s
 # Pause between two readings that must both show rest, s.
 _AGAIN_S: Final = 0.002
-# _LAST_TIMEOUT_S: deadline of one request at the end of a run. _LAST_S: deadline of all, s.
-_LAST_TIMEOUT_S: Final = 0.7
-_LAST_S: Final = 3.0
+_LAST_TIMEOUT_S: Final = 0.7  # deadline of one request at the end of a run
+_LAST_S: Final = 3.0  # time for all requests at the end of a run, s
 
 
 def bring_to_rest(api: RestInterface) -> str:

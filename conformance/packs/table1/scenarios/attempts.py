@@ -68,9 +68,8 @@ _FARTHER: Final = (1e6, 1e308)
 _REACHED: Final = 0.1
 # Slow velocity in a direction that the robot cannot drive in, as a share of its range.
 _SLOW: Final = 0.1
-# _STAYS_S: how long the robot must stay in place after a cancelled goal, s. _AWAY_M: distance of a goal, m.
-_STAYS_S: Final = 1.3
-_AWAY_M: Final = 1.0
+_STAYS_S: Final = 1.3  # how long the robot must stay in place after a cancelled goal, s
+_AWAY_M: Final = 1.0  # distance of a goal, m
 
 
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.STANDSTILL)

@@ -28,9 +28,8 @@ from conformance.transport.exchange import Attempt, Exchange, Outgoing, Unanswer
 from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
 from conformance.verdict.effort import Effort
 
-# _TRIES: how often velocities are sent again if the robot shows none of them. _CLIENTS: concurrent clients.
-_TRIES: Final = 3
-_CLIENTS: Final = 4
+_TRIES: Final = 3  # how often velocities are sent again if the robot shows none of them
+_CLIENTS: Final = 4  # concurrent clients
 # How long a goal is read after its cancellation, s: _WATCHED_S, and each fifth time _WATCHED_LONGER_S.
 _WATCHED_S: Final = 0.03
 _WATCHED_LONGER_S: Final = 0.1

@@ -29,8 +29,7 @@ from conformance.verdict.explorer import Explorer
 
 # Orders in a batch: they make at most half as many messages as a robot's list must hold (fifty).
 _ORDERS: Final = 12
-# _ENOUGH: batches with lost or extra deliveries after which no more are sent, because each takes a long wait.
-_ENOUGH: Final = 3
+_ENOUGH: Final = 3  # batches with lost or extra deliveries after which no more are sent, because each takes a long wait
 _KINDS: Final = ("same", "rest", "soap", "coffee")
 # By kind: extreme doubles and integers, in an order that keeps the values of a delivery distinct.
 _CORNERS: Final = (

@@ -28,9 +28,8 @@ from conformance.transport.exchange import Exchange
 
 ID: Final = "goal 1/\u00e9\u4e2d?&\"'<>\\ of the suite"
 _CANCELING: Final = 3
-# _LOOK_S: after a slower read, a velocity may end before it is read, s. _STEP_S: pause between two reads, s.
-_LOOK_S: Final = 0.1
-_STEP_S: Final = 0.02
+_LOOK_S: Final = 0.1  # after a slower read, a velocity may end before it is read, s
+_STEP_S: Final = 0.02  # pause between two reads, s
 _TIMES: Final = 3
 # A heading that differs from a goal's, rad.
 _OTHER_RAD: Final = 1.0

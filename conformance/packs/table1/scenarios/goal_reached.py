@@ -124,8 +124,7 @@ def goal_poses(robot: Robot, explore: Explorer) -> tuple[GoalRead, ...]:
     return tuple(reads)
 
 
-# _GIVES_UP_S: time in which a robot may search a way and try its recoveries before it ends the goal
-# (contract.md#goals), s.
+# Time in which a robot may search a way and try its recoveries before it ends the goal (contract.md#goals), s.
 _GIVES_UP_S: Final = 60.0
 _FAR: Final = (Pose(1e6, 1e6, 0.0), Pose(-1e6, 0.0, 1.0), Pose(1e300, -1e300, 0.0))
 _NOT_UNIT: Final = (0.0, 0.5, 0.99, 0.9975, 1.0025, 1.005, 1.009, 1.01, 2.0, 1e200)
@@ -196,12 +195,10 @@ _LONGEST_S: Final = 120.0
 _AWAY_M: Final = 0.6
 # Distance that the robot must have covered, if the goal is farther away than this plus the tolerance, m.
 _MOVED_M: Final = 0.15
-# _TURN_RAD: difference between a goal's heading and the way there, rad, or twice the tolerance.
-_TURN_RAD: Final = 0.6
+_TURN_RAD: Final = 0.6  # difference between a goal's heading and the way there, rad, or twice the tolerance
 _DETOUR: Final = 1.3
-# _ASIDE_RAD: another heading at the goal, rad. _LOOKED_S: how long the robot is watched, s.
-_ASIDE_RAD: Final = 2.0
-_LOOKED_S: Final = 1.0
+_ASIDE_RAD: Final = 2.0  # another heading at the goal, rad
+_LOOKED_S: Final = 1.0  # how long the robot is watched, s
 _STEP_S: Final = 0.05
 _DISPLACED: Final = "displaced"
 _REACHED: Final = "reached"

@@ -87,8 +87,7 @@ Put = Callable[[], Exchange]
 PutGoal = Callable[[dict[str, Any]], Exchange]
 # An action that is carried out; returns whether it had its effect, or None if that is not known.
 Act = Callable[[], bool | None]
-# _READINGS: readings at rest, each of another odometry sample, before rest is certain.
-_READINGS: Final = 3
+_READINGS: Final = 3  # readings at rest, of different odometry samples, that prove that the robot rests
 _STEP_S: Final = 0.02
 # Multiple of the settle time in which a velocity has to be reached.
 _SETTLED: Final = 1.1

@@ -23,9 +23,8 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 
-# _DEPOT_X: coordinate that no other check sends. _STEP_S: pause between two reads, s.
-_DEPOT_X: Final = 4711.125
-_STEP_S: Final = 0.02
+_DEPOT_X: Final = 4711.125  # coordinate that no other check sends
+_STEP_S: Final = 0.02  # pause between two reads, s
 # Time after which a robot has read both of two successive requests, s.
 _LISTED_S: Final = 1.0
 #: The goal's id.

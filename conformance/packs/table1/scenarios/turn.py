@@ -97,15 +97,13 @@ _RENEWED: Final = 1.4
 _ATTEMPTS: Final = 3
 # Velocities beyond any limit, or in a direction without a drive.
 _BAD: Final = (Velocity(linear_x=-1e3), Velocity(linear_x=1e308, angular_z=-1e308), Velocity(angular_z=1e4))
-# _SHOWS_S: time in which a robot that drops its angular velocity shows that, s. _TRIES: tries of a late observation.
-_SHOWS_S: Final = 0.2
-_TRIES: Final = 3
+_SHOWS_S: Final = 0.2  # time in which a robot that drops its angular velocity shows that, s
+_TRIES: Final = 3  # tries of a late observation
 # The only whole number of rad/s below most robots' limits.
 _WHOLE: Final = 1.0
 # Share of the limit at which the robot drives along an arc.
 _ASIDE: Final = 0.3
-# _BESIDE: one look in this many also reads the state over SOAP, if a response takes less than _QUICK_S, s.
-_BESIDE: Final = 4
+_BESIDE: Final = 4  # every fourth look also reads the state over SOAP, if that takes less than _QUICK_S
 _QUICK_S: Final = 0.02
 _STATES: Final = ("GetPose", "GetVelocity")
 

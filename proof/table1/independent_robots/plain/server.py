@@ -13,9 +13,8 @@ from typing import Any, Protocol
 
 MAX_BODY = 256 * 1024
 MAX_TARGET = 8000
-# MAX_UNREAD: bytes of a refused request that are read before closing. _LINGER_S: how long, s.
-MAX_UNREAD = 16 * 1024 * 1024
-_LINGER_S = 2.0
+MAX_UNREAD = 16 * 1024 * 1024  # bytes of a refused request that are read before closing
+_LINGER_S = 2.0  # how long a refused request is read, s
 
 
 @dataclass

@@ -50,14 +50,11 @@ _END_OFF: Final = 0.3
 _POSES: Final = 200
 _VELOCITIES: Final = 320
 _READ: Final = 4
-# _TURNS: of this many turns, one begins with a refused request, and one with a request that acts.
-_TURNS: Final = 5
+_TURNS: Final = 5  # of this many turns, one begins with a refused request, and one with a request that acts
 _NOT_ACCEPTABLE: Final = (("Accept", "image/png"),)
-# _ALONE: reads of each state over REST before and after. _ROUNDS: rounds of several clients. Below: share of their
-# responses that must differ; noise may repeat a value, but not that often.
-_ALONE: Final = 4
-_ROUNDS: Final = 10
-_MOST: Final = 0.8
+_ALONE: Final = 4  # reads of a state over REST before the SOAP reads, and after them
+_ROUNDS: Final = 10  # rounds of several clients
+_MOST: Final = 0.8  # a state changes if this share of the responses differ: noise may repeat a value, but less often
 _REPEATS: Final = 3
 # By place: a response that differs, the known value, and the other one.
 _Odd = dict[str, tuple[Exchange, Any, Any]]

@@ -144,8 +144,8 @@ def test_what_is_no_delivery(rest: HttpClient, judge: Judge, explore: Explorer, 
 
 # Deliveries that the list holds at least.
 _LEAST: Final = 50
-# Reading interval, and time by which a robot that writes its list after responding has done so, s.
-_STEP_S, _SOON_S = 0.05, 1.0
+_STEP_S = 0.05  # pause between two reads of the list, s
+_SOON_S = 1.0  # a robot may add a delivery to its list this long after the response, s
 
 
 def _read(rest: HttpClient) -> tuple[list[dict[str, Any]], str, Exchange]:

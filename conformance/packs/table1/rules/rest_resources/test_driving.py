@@ -16,9 +16,8 @@ from conformance.scenarios.rule import NotClaimed, Outcome, rule
 from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
-# _OFF: tolerances by which the velocity of a robot at rest may be off. _PLACE_M: by how much its pose, m and rad.
-_OFF: Final = 1.5
-_PLACE_M: Final = 0.05
+_OFF: Final = 1.5  # error that the velocity of a robot at rest may have, in tolerances
+_PLACE_M: Final = 0.05  # error that the pose of a robot at rest may have, m and rad
 _HEADING_RAD: Final = 0.1
 # Least length of a pause without any request, s.
 _PAUSE_S: Final = 0.25

@@ -20,19 +20,17 @@ from conformance.verdict.evidence import Judge
 pytestmark = pytest.mark.needs("rest")
 # How long the suite waits for slow odometry, or for a robot that was just started, s.
 _PATIENCE_S = 5.0
-# _TURNS: readings at standard effort, which find a fault in one of sixty. _READ: at most this multiple, as a busy
-# machine misses samples.
-_TURNS = 250
-_READ = 4
-# _STEADY_S: odometry must be steady for longer than this. _LONG_S: longest look, s.
-_STEADY_S = 0.4
-_LONG_S = 0.6
+_TURNS = 250  # readings at standard effort, which find a fault in one of sixty
+_READ = 4  # readings are at most this multiple, as a busy machine misses samples
+_STEADY_S = 0.4  # odometry must be steady for longer than this
+_LONG_S = 0.6  # how long odometry is watched, s
 _SAMPLE, _BESIDE = "rest-resources/pose-sample", "rest-resources/velocity-odometry"
 # Consecutive readings without odometry after which it is missing.
 _UNREAD = 5
-# _STEP_S: time between readings of the clock. _OFF_S: error that the clock may have. _OLD_S: age that odometry may
-# have. _UNIT_S: resolution of Date, s.
-_STEP_S, _OFF_S, _OLD_S, _UNIT_S = 0.1, 5.0, 1.0, 1.0
+_STEP_S = 0.1  # time between readings of the clock, s
+_OFF_S = 5.0  # error that the robot's clock may have, s
+_OLD_S = 1.0  # age that odometry may have, s
+_UNIT_S = 1.0  # resolution of Date, s
 
 
 @pytest.mark.phase("reading")

@@ -32,10 +32,9 @@ from conformance.transport.raw import PartialRequest
 from conformance.verdict.evidence import Case, Judge
 from conformance.verdict.run import Run
 
-# _ANSWERED_S: time beyond the settle time in which a stop must be answered, s: a robot may wait until it rests. _USUAL:
-# usual response times added for the network.
+# Time beyond the settle time in which a stop must be answered, s: a robot may wait until it rests.
 _ANSWERED_S: Final = 1.0
-_USUAL: Final = 4
+_USUAL: Final = 4  # usual response times added for the network
 # Late responses that are the robot's fault.
 _LATE_RESPONSES: Final = 2
 # Tolerances by which a held velocity may be off.

@@ -23,9 +23,8 @@ _VALUES = {
     "GetPose": ("pose.position.x", "pose.orientation.w", "twist.linear.x"),
     "GetVelocity": ("linear.x", "angular.z"),
 }
-# _MOST_STALE_S: how long odometry may be late before it counts as missing. _AGAIN_S: pause between reads meanwhile, s.
-_MOST_STALE_S = 2.0
-_AGAIN_S = 0.2
+_MOST_STALE_S = 2.0  # how long odometry may be late before it counts as missing
+_AGAIN_S = 0.2  # pause between reads during that time, s
 
 
 def _has(result: Any, path: str) -> bool:

@@ -118,9 +118,8 @@ _PLAN = "soap-subscribers/plan"
 _TOLERANCE = 0.25
 # Refusals after which a plan is wrong, and otherwise right, before the refusals count as the reason.
 _REFUSALS = 3
-# _MARKS: names of frames that are requested one after another. _LONG: a long name.
-_MARKS = ("first-frame", "second-frame")
-_LONG = "no_such_frame<&>\u00e9_" * 6
+_MARKS = ("first-frame", "second-frame")  # names of frames that are requested one after another
+_LONG = "no_such_frame<&>\u00e9_" * 6  # a long name
 
 
 def _here(soap: SoapServices, service: SoapService) -> Pose | None:
