@@ -32,7 +32,7 @@ BUSY = 0.9
 RESOLUTION = 1.08  # a bracket whose ends differ by no more is narrow enough
 _GROWTH = 2.0
 _NEAR = 1.5  # the next search begins this far from an earlier one's bracket
-#: A second rate, higher by at most this factor, must miss too before a bracket's end counts.
+#: A rate counts as too high only if a second rate, higher by at most this factor, misses the target too.
 _CONFIRMED = 1.25
 _MISSES, _MOST_TRIALS = 2, 5  # of one rate: misses in which the generator was on time; trials in all
 

@@ -186,8 +186,8 @@ Interval = tuple[float, float]
 
 #: With fewer repeats, the rounds of all repeats are resampled, and the interval is widened by the repeats' difference.
 LEAST_REPEATS = 4
-#: Relative standard deviation of the ratio between runs: of a machine that had processors to spare, and of one that
-#: had none when the run began.
+#: Relative standard deviation of the ratio between runs, on a machine with idle processors, and on one without when
+#: the run began.
 IDLE_MACHINE, BUSY_MACHINE = 0.01, 0.02
 _REACH = 1.959964  # standard deviations to either side hold 95 %
 

@@ -28,11 +28,10 @@ pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 _AVAILABLE, _MANY = "http/available", "http/many-requests"
 _IN_ALL = 120  # reads on one connection
 _EACH = 60  # reads of each resource at standard effort
-# Dropped requests that show a habit of the robot, and not just the end of an idle connection.
+# After this many dropped requests, the robot is at fault; a single one may meet the end of an idle connection.
 _DROPS = 3
-# Time for reads that follow each other at once, s. If some fail, the robot is read again at the requirement's rate:
-# this many reads, at this interval, s.
-_FIRST_S = 3.0
+_FIRST_S = 3.0  # time for reads without a pause, s
+# If some of them fail, the robot is read at the rate that the requirement states: _READS reads, one each _EVERY_S, s.
 _READS, _EVERY_S = 100, 0.1
 # A client that gets 429 or 503 reads _SLOW_READS times, once each _SLOW_S, s.
 _SLOW_READS, _SLOW_S = 10, 1.0
