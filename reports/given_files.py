@@ -27,7 +27,7 @@ def read_octets(path: Path, most: int = MOST_BYTES, root: Path | None = None, *,
     Args:
         path: the file.
         most: how long it may be, in bytes.
-        root: the folder that it must lie in, links followed; None: the file is the user's, wherever it is.
+        root: the folder that it must lie in, links followed; None if the file is the user's, wherever it is.
         cut: whether to return the beginning of a file that is too long.
 
     Raises:

@@ -48,7 +48,7 @@ class Device:
 
     @property
     def hold_s(self) -> float | None:
-        """Time for which a command lasts unless it is repeated, s; None: for ever."""
+        """Time for which a command lasts unless it is repeated, s; None means for ever."""
         return None
 
     def fit(self, api: Rest, operation_id: str, value: Any) -> Any:  # noqa: ARG002 - for packs

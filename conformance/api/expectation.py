@@ -16,7 +16,7 @@ class Expectation:
         judge: records the evidence.
         requirement: id of the requirement.
         attempt: the request with its response or the reason for a missing one; None if no request was sent.
-        got: description of the response; empty: status and media type, which the finding contains anyway.
+        got: description of the response; empty means status and media type, which the finding contains anyway.
     """
 
     judge: Judge
@@ -37,8 +37,8 @@ class Expectation:
         Args:
             holds: whether it does.
             expected: what the requirement demands, as a noun phrase.
-            got: what the response showed, as a noun phrase; empty: status and media type.
-            cause: failures of the same cause are one finding; empty: the texts without their numbers.
+            got: what the response showed, as a noun phrase; empty means status and media type.
+            cause: failures of the same cause are one finding; empty means the texts without their numbers.
         """
         return self.judge.check(self.requirement, holds, self.attempt, expected, found=got or self.got, cause=cause)
 

@@ -23,7 +23,7 @@ class Mutation(Generic[Made]):
         made: the invalid document.
         field: name of the invalid field, or empty.
         shown: the invalid value as an error message can quote it, or empty.
-        malformed: whether it cannot be parsed (400) or has an invalid shape or value (422); None: either.
+        malformed: whether it cannot be parsed (400) or has an invalid shape or value (422); None means either.
         reason: why validators reject it, or empty.
     """
 

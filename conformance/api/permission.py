@@ -102,7 +102,7 @@ class Permission:
         return f"{method} {path[:200]} was not sent: {reason}"
 
     def _moves(self, method: str, url: str) -> bool | None:
-        """Return whether the contract pack says that a request's operation moves (x-roaas-motion); None: unknown."""
+        """Return whether the contract pack says that a request's operation moves (x-roaas-motion); None if unknown."""
         base = (self._run.statement.endpoints.rest or "").rstrip("/")
         path = _place(url).removeprefix(base)
         if not base or not _place(url).startswith(f"{base}/") or not is_normal(path):

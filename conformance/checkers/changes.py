@@ -101,9 +101,9 @@ class _State:
     Attributes:
         value: as it was last read or told.
         at_s: when, s of the monotonic clock.
-        was: what was read before an operation told it; empty: it was read.
+        was: what was read before an operation told it; empty if it was read.
         told: the operation that told it.
-        by: an operation that was accepted since then, and must not change a final state; empty: none.
+        by: an operation that was accepted since then, and must not change a final state; empty if there is none.
         refused: an operation of the thing that was refused since then.
         ends: the times of its end that were read with it.
     """
@@ -386,7 +386,7 @@ def _alone(operation: Operation, states: tuple[str, ...]) -> frozenset[str]:
 
 
 def _alone_states(operation: Operation, states: tuple[str, ...]) -> frozenset[str]:
-    """Return the states that one thing alone may have, by what the description says."""
+    """Return the states that only one thing may have at a time, according to the description."""
     said = another_of(operation)
     if "409" not in operation.responses or _SHARING.search(said.partition(",")[0]):
         return frozenset()
@@ -562,7 +562,7 @@ def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]
 
 
 def _values_in(predicate: str, words: dict[str, str]) -> set[str]:
-    """Return the values whose words begin a predicate, as in "running or paused, or has items"; none beside "and"."""
+    """Return the values that begin a predicate, as in "running or paused, or has items"; none if it has "and"."""
     found = set[str]()
     for part in re.split(r"\s*,\s*(?:or\s+)?|\s+or\s+", predicate.strip()):
         text = _BESIDE.sub("", part).strip()

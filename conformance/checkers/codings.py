@@ -91,7 +91,7 @@ def _judge_allowed(occasion: Occasion) -> Iterator[Case]:
 
 
 def _beside(occasion: Occasion, bare: Response) -> Iterator[Case]:
-    """Judge the header fields of a coded response beside those of one without a coding."""
+    """Compare the headers of a coded response with those of an uncoded one."""
     answer, label = occasion.response, label_of(occasion.operation)
     tag, vary = answer.header("etag") or "", answer.header("vary") or ""
     if tag.startswith('"') and bare.header("etag"):

@@ -65,7 +65,7 @@ class Command(NamedTuple):
     Attributes:
         operation: a POST.
         read: the GET of the thing.
-        switch: the boolean that it sets, and its value then; None: it sets none.
+        switch: the boolean that it sets, and its value then; None if it sets none.
         state: the member with the thing's state, and the states from which the command leads to another; None: none.
     """
 

@@ -215,7 +215,7 @@ def _digests(occasion: Occasion) -> Iterator[Case]:
 
 
 def _member(occasion: Occasion) -> Iterator[Case]:
-    """Judge a member of a response to an upload that tells the file's digest."""
+    """Judge a member with the file's digest in the response to an upload."""
     answer = occasion.response
     value = read_json(answer.body).value if is_json(answer.media_type) else None
     for name, text in value.items() if isinstance(value, dict) else ():

@@ -407,7 +407,7 @@ def says_whole(parameter: Parameter) -> bool:
 
 
 def _said_order(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
-    """Judge the order that the description of a list tells: by a member, or by the one time that all items have."""
+    """Judge the order that the description of a list promises: by a member, or by the only time in all items."""
     text = listing.operation.text
     said, by = IN_TIME.search(text), _BY.search(text)
     found = said or by
@@ -440,7 +440,7 @@ def _time_member(listing: Listing) -> str:
 
 
 def _asking(listing: Listing, parameter: str, text: str) -> Callable[[Mapping[str, Any]], bool] | None:
-    """Return whether an item has what a parameter's text asks for; None of parameters of which that is not known."""
+    """Return a function: does an item match a filter parameter's text? None if the parameter's meaning is unknown."""
     if listing.search is not None and listing.search.name == parameter and text.strip():
         return lambda item: _contains(listing, item, text)
     for name, given in listing.filters.items():
@@ -491,7 +491,7 @@ def _links(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, 
 
 
 def _place(listing: Listing, sent: Mapping[str, str]) -> int | None:
-    """Return the number of a page, or of its first item; None if the description does not tell it."""
+    """Return the number of a page, or of its first item; None if the description does not define it."""
     where = listing.page or listing.offset
     if where is None or where.name in sent:
         return None if where is None else number_of(sent[where.name])

@@ -85,9 +85,9 @@ class _Thing:
         absent: whether a read has shown that it is not there.
         own: whether this run has created what it deleted.
         ends: kinds of things that end with it, by what the description of its DELETE says.
-        doubt: why it may be read although it was deleted; empty: it may not.
+        doubt: why it may be read although it was deleted; empty if it may not.
         made: whether this run created it, and no read has shown it yet.
-        body: hash of that of the POST that created it; 0: there was none.
+        body: hash of that of the POST that created it; 0 if there was none.
         replaced: whether an equal one was created later, which may be there in its place.
         written: what it has to read, by member, with the operation that wrote it.
         shown: the members that were read as written, with how much had been sent by then that may change something.
@@ -252,7 +252,7 @@ class Memory:
 
     @staticmethod
     def _judge_put(occasion: Occasion, put: Operation, before: _Thing | None) -> Iterator[Case]:
-        """Judge whether a PUT tells by 201 that it has created a thing, and by other statuses that it replaced one."""
+        """Judge whether a PUT that creates a thing is answered 201, and one that replaces a thing is not."""
         is_new, status = before is not None and before.gone and before.absent, occasion.response.status
         if put.method == "PUT" and before is not None and (is_new or not (before.gone or before.absent)):
             expected = f"status 201, as a GET after {before.change} found nothing" if is_new else "status 200 or 204"
@@ -554,7 +554,7 @@ def _is_for_ever(item: Operation, create: Operation) -> bool:
 
 
 def _above(template: str) -> Iterator[str]:
-    """Yield the paths that one is below."""
+    """Yield the paths of all parents of a path."""
     while template := template.rpartition("/")[0]:
         yield template
 

@@ -178,7 +178,7 @@ def _case(occasion: Occasion, *, holds: bool) -> Case:
 
 
 def _declared_refusal(occasion: Occasion, resource: Resource) -> Iterator[Case]:
-    """Judge the JSON of a 405 by the schemas that the path's operations declare for it by its number."""
+    """Judge the JSON of a 405 by the schemas that the path's operations declare for the status 405."""
     answer = occasion.response
     declared = [item.responses.get("405", {}).get(answer.media_type) for item in resource.operations.values()]
     schemas = [one for one in declared if one]

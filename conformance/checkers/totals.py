@@ -75,7 +75,7 @@ class _Count:
     """The history of one total of one operation with one choice of filters.
 
     Attributes:
-        agrees: whether it was the number of items the first time that a whole list was shown; None: none was.
+        agrees: whether it was the number of items the first time that a whole list was shown; None if none was.
         is_of_all: whether it was more than the items on a page, so that it is not the number of those.
         all: the number of items when it agreed last.
         all_s: when that was.
@@ -146,7 +146,7 @@ class Totals:
         self._apart.clear()
 
     def __call__(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
-        """Yield the cases of one response; none if the parameters do not tell which part of the list it contains."""
+        """Yield the cases of one response; none if the parameters do not show which part of the list it contains."""
         label, shown = listing.operation.label, len(page.items)
         self._longest[label] = max(self._longest[label], shown)
         elsewhere = {parameter.name for parameter in (listing.page, listing.cursor) if parameter is not None}
@@ -185,7 +185,7 @@ class Totals:
     def _of_all_pages(
         self, listing: Listing, part: _Part, name: str, chosen: frozenset[tuple[str, str]], total: int
     ) -> Iterator[Case]:
-        """Judge a total that counts all pages, by the description, between two reads of the whole list that tell it."""
+        """Judge a total of all pages (the description says so) by two reads of the whole list, before and after."""
         paging = {one.name for one in (listing.limit, listing.offset) if one is not None}
         names, path = {text for text, _ in chosen}, part.occasion.context.target.partition("?")[0]
         if not (_OF_ALL.search(listing.says.get(name, "")) and part.names <= names | paging):
@@ -248,7 +248,7 @@ _STAY: Final = re.compile(
 
 
 def numbers_of(above: Operation, lister: Operation, *, is_beside: bool = False) -> dict[str, str]:
-    """Return the numbers of a thing that a list below it tells too: how many items it has, or the sum of a member.
+    """Return the members of a thing that a list below it must confirm: a count of items, or the sum of a member.
 
     By the number's name: the member that is added up; empty for the number of items. Of a thing beside the list, only
     those that are the number of all its items.
@@ -272,7 +272,7 @@ def numbers_of(above: Operation, lister: Operation, *, is_beside: bool = False) 
 
 
 def counters_of(operations: Iterable[Operation]) -> dict[str, tuple[Operation, dict[str, str]]]:
-    """Return, by the path of a list, the read of a thing such as `/stats` that tells how many items it has."""
+    """Return by the path of each list the read of a resource, such as `/stats`, that contains its number of items."""
     reads = [one for one in operations if one.method == "GET" and not one.parameter("path")]
     things = [one for one in reads if listing_of(one) is None and _COUNTED.search(str(one.shape))]
     pairs = [(lister.template.rstrip("/"), one, lister) for lister in reads if listing_of(lister) for one in things]

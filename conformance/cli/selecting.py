@@ -30,9 +30,9 @@ def select_ids(
     Args:
         ledger: the requirements by id.
         claims: the judged classes.
-        select: ids, classes or patterns with `*`; empty: all.
+        select: ids, classes or patterns with `*`; empty means all.
         exclude: the same; they win.
-        among: ids that are chosen from; None: all.
+        among: ids that are chosen from; None means all.
 
     Raises:
         SelectionError: a pattern fits no requirement that is judged, or nothing is left.

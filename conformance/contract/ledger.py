@@ -34,7 +34,7 @@ class Requirement:
         same_as: requirements of the generic suite that ask the same: where a contract does not have them, what judges
             them judges this one; a contract that has them does not have a generic one beside them.
         also: further classes that it binds: it is judged when one of them is claimed, and all of them fail with it.
-        topic: what it is about, for readers; None: its class's topic.
+        topic: what it is about, for readers; None means its class's topic.
         breaks: what breaks in practice when a device does not meet it, or None.
     """
 

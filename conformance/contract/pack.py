@@ -57,7 +57,7 @@ class Contract:
         wadl_path: the WADL, or None.
         publishers_path: the WSDL of the service that acts, or None.
         subscribers_path: the WSDL of the service that only reads, or None.
-        only: ids of the requirements to judge; empty: all.
+        only: ids of the requirements to judge; empty means all.
         manifest: content of ``pack.toml``, or None without that file.
     """
 

@@ -104,7 +104,7 @@ def judged_by(contract: Contract, name: str | None) -> RequirementSet | None:
 
     Args:
         contract: the contract of the run.
-        name: the requested set; None: everything in this suite.
+        name: the requested set; None means everything in this suite.
 
     Raises:
         RequirementSetError: the set does not exist, or the contract has no pack.toml.

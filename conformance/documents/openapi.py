@@ -72,7 +72,7 @@ class Operation:
         optional: whether a robot need not implement it.
         headers: required flag and schema of response headers, by status and name in lower case.
         tags: groups that the description puts it in.
-        security: names of the security schemes of each alternative; empty: none is needed.
+        security: names of the security schemes of each alternative; empty if none is needed.
         never: whether the description says that a test must not send it (x-roaas-never).
         stop: whether it stops the device (x-roaas-stop).
         reads: whether it only reads, whatever its method (x-roaas-reads).
@@ -376,7 +376,7 @@ def resources_of(contract: Contract) -> tuple[Resource, ...]:
 
 @lru_cache(maxsize=8)
 def _by_place(contract: Contract) -> dict[tuple[int, str], list[Resource]]:
-    """Return the resources by how many slashes they have and by their first segment; empty: that is a template."""
+    """Return the resources by how many slashes they have and by their first segment; empty if that is a template."""
     found: dict[tuple[int, str], list[Resource]] = {}
     for item in resources_of(contract):
         found.setdefault(_place(sendable(item.template)), []).append(item)

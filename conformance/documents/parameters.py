@@ -24,7 +24,7 @@ class Parameter:
         also: other names of it, for instance in ROS (x-roaas-also).
         style: how arrays and objects are written.
         explode: whether their items are written apart.
-        media_type: of a parameter with ``content``; empty: it is written by its style.
+        media_type: of a parameter with ``content``; empty if it is written by its style.
         reserved: whether reserved characters are written as they are (allowReserved).
         empty: whether it may be written without a value (allowEmptyValue).
         says: the description of it.

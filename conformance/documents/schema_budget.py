@@ -26,7 +26,7 @@ _STATES_OF_ONE: Final = 200_000  # states of one pattern
 _PART: Final = re.compile(r"\\.|\[(?:\\.|[^\]\\])*\]|\{(\d{1,9})(?:,(\d{0,9}))?\}|.", re.DOTALL)
 _SCHEMAS: Final = frozenset({"schema", "schemas", "definitions", "example", "value"})
 _SHOWN: Final = 60
-# By name: most objects of that kind in an operation, outside of schemas.
+# Most entries of these objects and lists in an operation, outside of schemas.
 _CROWDS: Final = {
     "paths": 10_000, "parameters": 1_000, "responses": 1_000, "content": 1_000, "headers": 1_000, "callbacks": 1_000,
     "links": 1_000, "security": 1_000, "servers": 1_000, "encoding": 1_000, "examples": 10_000,

@@ -48,7 +48,7 @@ class SoapOperation:
     Attributes:
         name: in the port type.
         action: soapAction, or empty.
-        request: tag of the request's element, in Clark notation; empty: the Body is empty.
+        request: tag of the request's element, in Clark notation; empty if the Body is empty.
         response: tag of the response's element; None for a one-way operation.
         remark: why its messages cannot be made, or empty.
         headers: tags of the header blocks that its messages have (WSDL 1.1, 3.7).

@@ -54,7 +54,7 @@ def write_soap_pack(
         found: what the WSDL describes.
         location: that of the WSDL.
         documents: all documents by location.
-        address: where the service is, whatever the WSDL says; empty: as it says.
+        address: where the service is, whatever the WSDL says; empty means what it says.
         named: locations of schemas that were found by their namespace.
         foreign: whether the WSDL is not the device's own.
         mapped: the classes that maps in the statement claim.

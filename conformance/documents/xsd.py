@@ -1,7 +1,7 @@
 """XML Schemas from several documents, compiled by both libxml2 and xmlschema.
 
-A message counts as valid or invalid only if both agree, so that a bug in one of them blames no robot. What would
-take a compiler more memory or time than there is, is found before one sees it.
+A message counts as valid or invalid only if both agree, so that a bug in one of them blames no robot. Schemas that
+would take too much memory or time are refused before they are compiled.
 """
 
 from __future__ import annotations

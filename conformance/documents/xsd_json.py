@@ -76,7 +76,7 @@ def schema_of(
         declared: the element.
         depth: how deep it is.
         given: values of members by name; then texts have a default, and attributes are called ``@name``, as in a map.
-        branch: of each choice, in rotation; None: all of them, as optional.
+        branch: of each choice, in rotation; None means all of them, as optional.
     """
     kind, at, text = declared.type, "" if given is None else "@", "value" if given is None else "#text"
     own: dict[str, Any] = {"description": declared.documentation} if declared.documentation else {}

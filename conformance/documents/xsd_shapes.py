@@ -30,8 +30,8 @@ class Simple:
 
     Attributes:
         builtin: local name of the built-in type (XML Schema Part 2) that it is derived from.
-        enumeration: allowed values, as written; empty: any.
-        minimum: smallest value; maximum: greatest; None: those of the built-in type.
+        enumeration: allowed values, as written; empty means any.
+        minimum: smallest value; maximum: greatest; None means those of the built-in type.
         min_length: in characters; max_length: likewise.
         patterns: regular expressions (XML Schema) that a value must match.
         many: whether it is a list of such values.

@@ -50,7 +50,7 @@ class ChecksPlugin:
     Args:
         connect: returns the connected robot; called once, when there is a check to run.
         contract: returns the contract pack; called when the first file with checks is collected.
-        recordings: keeps the traces of scenarios; None: they are discarded.
+        recordings: keeps the traces of scenarios; None if they are discarded.
     """
 
     def __init__(

@@ -111,21 +111,21 @@ class Commanded:
 
     @property
     def bounds(self) -> tuple[float, float] | None:
-        """The least and the greatest value by the schema; None: it does not declare both."""
+        """The least and the greatest value by the schema; None if it does not declare both."""
         said = self._in_words
         found = bounds_of(self.schema) or (said and (said[0], said[1]))
         return (-found[1], found[1]) if found and self.direction else found
 
     @property
     def source(self) -> str:
-        """Where its limits come from, in words; empty: it has none."""
+        """Where its limits come from, in words; empty if it has none."""
         if bounds_of(self.schema):
             return "as declared"
         return f'as its description says: "{self._in_words[2]}"' if self._in_words else ""
 
     @property
     def _in_words(self) -> tuple[float, float, str] | None:
-        """The limits in its description, and their words; None: it names none, several, or what may change them."""
+        """The limits in its description, and their words; None if it names none, several, or what may change them."""
         text, least = str(self.schema.get("description", "")), _bound(self.schema, "minimum")
         found = [(one[0], [part for part in one.groups("") if part]) for one in _RANGE.finditer(text)]
         drives = self.direction or FAST.search(self.place) or _DRIVES.search(self.operation)
@@ -182,13 +182,13 @@ class Commanded:
 
 
 def bounds_of(schema: Schema) -> tuple[float, float] | None:
-    """Return the least and the greatest number of a schema; None: it does not declare both."""
+    """Return the least and the greatest number of a schema; None if it does not declare both."""
     least, most = _bound(schema, "minimum"), _bound(schema, "maximum")
     return (float(least), float(most)) if least is not None and most is not None and least < most else None
 
 
 def unit_of(place: str, schema: Schema) -> str:
-    """Return the unit of a number that its name or its description says; empty: neither does."""
+    """Return the unit of a number that its name or its description says; empty if neither does."""
     said = (place, str(schema.get("description", "")))
     return next((unit for text in said for unit, words in _UNITS.items() if re.search(words, text, re.IGNORECASE)), "")
 

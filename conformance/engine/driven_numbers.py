@@ -1,4 +1,4 @@
-"""The numbers that a device tells, by JSON pointer: as it is driven a little, and which of them tells an axis."""
+"""Record the numbers in a device's responses during small moves, and find those that show the moved axis."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ class Looks:
     def places_of(
         self, numbers: Sequence[Commanded], path: str, operations: Iterable[str]
     ) -> dict[str, tuple[str, str]]:
-        """Return operation and place of each commanded number: of one operation, as far as it tells them.
+        """Return operation and place of each commanded number, of one operation as far as possible.
 
         Args:
             numbers: what is commanded.
@@ -166,7 +166,7 @@ class Looks:
         return any(f"{value:g}" in ids for _, value in self.samples(operation, f"{thing}/id", 0.0)[-1:])
 
     def _turn(self, operation: str, place: str) -> float:
-        """Return what a whole turn is at a place; 0: it is no angle that begins anew."""
+        """Return what a whole turn is at a place; 0 if it is no angle that begins anew."""
         if ANGLE in place:
             return math.tau
         if not self.is_heading(place):

@@ -108,7 +108,7 @@ class Plan:
         reads: operations that may show it, the likeliest first.
         is_velocity: whether it commands velocities; else positions.
         stop: the operation beside it that stops the device, by its name; or None.
-        named: the operation that commands as the description has it, without values in its path; None: the same.
+        named: the operation that commands as the description has it, without values in its path; None means the same.
         preparing: what the device may want before it moves.
         is_prepared: whether the user says that it wants that.
         text: what the description says of all operations and of this one.
@@ -166,7 +166,7 @@ def plan_of(
     Args:
         operations: of the description.
         drive: names the operation that commands.
-        read: names the one that shows where the device is; None: it is chosen.
+        read: names the one that shows where the device is; None if it is chosen.
         rules: what may be called.
         before: what the user sends before.
         text: what the description says of all operations.
@@ -423,7 +423,7 @@ class Finder(ABC):
     @property
     @abstractmethod
     def _body(self) -> Any:
-        """The body of a command; None: it has none."""
+        """The body of a command; None if it has none."""
 
     def _sending_lines(self, names: Collection[str], still: Mapping[str, float], seconds: object) -> Iterator[str]:
         """Yield how the map sends a command: numbers by name, and what it sends for those that stay ``still``."""
@@ -442,7 +442,7 @@ class Finder(ABC):
             yield 'beyond_limits = "refused"  # the description declares limits, and a response for invalid requests'
 
     def _stop_call(self) -> tuple[str, Any] | None:
-        """Return call and body of the stop beside the operation, with templates; None: what it takes is not known."""
+        """Return path and body of the stop that belongs to the operation; None if it needs values that are unknown."""
         stop = self._plan.stop
         if stop is None:
             return None
@@ -458,7 +458,7 @@ class Finder(ABC):
         return call, {name: f"{{goto:/{name}}}" for name in wanted} or None
 
     def _stop_lines(self, rests_s: float, source: str) -> Iterator[str]:
-        """Yield the stop beside the operation that moves the device, if what it takes is known."""
+        """Yield the stop that belongs to the operation that moves the device, if its parameters are known."""
         if (found := self._stop_call()) is not None:
             yield ""
             yield "[motion.stop]"

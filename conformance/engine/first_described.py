@@ -270,7 +270,7 @@ def _sending_lines(pair: _Pair) -> Iterator[str]:
 
 
 def _stop(operations: Sequence[Operation], move: Operation) -> Iterator[str]:
-    """Propose the stop beside a move."""
+    """Propose the operation that stops a move."""
     if (found := stop_beside(operations, move)) is not None:
         yield ""
         yield "[motion.stop]"
@@ -287,7 +287,7 @@ def _belongs(state: Operation, sent: Operation) -> bool:
 
 
 def _axis_by_axis(reading: Sequence[Operation], sent: Operation, numbers: Sequence[Commanded]) -> _Pair | None:
-    """Return a pair of which an operation of its own, called as the number, tells each; None: some have none."""
+    """Return for each number the operation of the same name that reads it; None if a number has no such operation."""
     folder, reads, places = posixpath.dirname(sent.template), dict[str, Operation](), dict[str, Commanded]()
     for number in numbers:
         for state in reading:
@@ -305,7 +305,7 @@ def _best(
     sending: Sequence[tuple[Operation, Sequence[Commanded]]],
     place_of: Callable[[Commanded, Sequence[str]], str | None],
 ) -> _Pair | None:
-    """Return the two operations of which most of what one commands is in the response of the other."""
+    """Return the pair of operations for which the response of one contains most of what the other commands."""
     found = []
     for state in reading:
         told = [at for at, _ in numbers_in(state.shape or {})]
@@ -321,12 +321,12 @@ def _best(
 
 
 def _position(number: Commanded, told: Sequence[str]) -> str | None:
-    """Return where a state tells the position of what is commanded."""
+    """Return where a state contains the position of the commanded axis."""
     return next((at for at in told if not _MEASURED.search(at) and axis_of(at) == axis_of(number.place)), None)
 
 
 def _velocity(number: Commanded, told: Sequence[str]) -> str | None:
-    """Return where a state tells a velocity, or else the position that it changes."""
+    """Return where a state contains a velocity, or else the position that it changes."""
     measured = (at for at in told if _MEASURED.search(at) and f"{at}/".endswith(f"{number.place}/"))
     changed = (at for at in told if not _MEASURED.search(at) and axis_of(at) == axis_of(number.place))
     return next(measured, None) or (next(changed, None) if axis_of(number.place).strip("xyz") else None)
@@ -391,7 +391,7 @@ def write_described_statement(
         api: overlays and base URL as the options give them.
         calls: what may be called as the options say it.
         where: credentials and the connection as the options give them.
-        ros: makes the lines of a ROS map of the operations; None: there is none.
+        ros: makes the lines of a ROS map of the operations; None if there is none.
 
     Raises:
         DescriptionError: the description is malformed.

@@ -97,7 +97,7 @@ class Graph(NamedTuple):
     def fitting(
         self, schema: Schema | None, ends: dict[str, str], part: str = "", holder: re.Pattern[str] | None = None
     ) -> dict[str, Fit]:
-        """Return by name the ends of the graph whose type, or a part of it, has a schema's fields.
+        """Return by name the topics, services and actions whose type, or a part of it, has a schema's fields.
 
         An object without declared fields has them if its name is that of a ``holder``, or if a list names the end.
         """
@@ -119,7 +119,7 @@ class Fit:
 
     Attributes:
         at: where the message is.
-        fields: the map's key `fields`; empty: the names are those of the message.
+        fields: the map's key `fields`; empty if the names are those of the message.
         size: how many fields both have.
         lacks: how many fields of the message the schema lacks.
         forms: how it writes numbers and octets, by key of the map.
@@ -331,7 +331,7 @@ def _failure(one: Operation, at: str, definition: Definition) -> dict[str, Any]:
 
 
 def _best(one: Operation, fits: dict[str, Fit], written: Collection[str] = ()) -> tuple[str, str]:
-    """Return the graph's end that an operation fits best, and why that is a guess; empty if there is none."""
+    """Return the topic, service or action that an operation fits best, and why that is a guess; empty if none fits."""
 
     def rank(name: str) -> tuple[bool, bool, int, float]:
         return name not in written, not fits[name].lacks, fits[name].size, _shared_words(one, name)
@@ -451,12 +451,12 @@ def _places(schema: Schema) -> dict[str, dict[str, Schema]]:
 
 
 def _fit(places: dict[str, dict[str, Schema]], definition: Definition, message: str = "") -> Fit | None:
-    """Return how a schema has the fields of a message, where in it it has most; None: it is another message.
+    """Return how a schema has the fields of a message, where in it it has most; None if it is another message.
 
     Args:
         places: of the schema.
         definition: of a type.
-        message: a type in it; empty: itself.
+        message: a type in it; empty means itself.
     """
     own = dict(_own_leaves(definition, message))
     if not own:

@@ -1,4 +1,4 @@
-"""Operations to which a request tells a ROS name: in a parameter of the query, or in a member of the body."""
+"""Find operations whose requests contain a ROS name: in a query parameter, or in a member of the body."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Named(NamedTuple):
 
 
 def named_in_requests(operations: Sequence[Operation], ends: Mapping[str, dict[str, str]]) -> Iterator[Named]:
-    """Yield each operation to which requests tell a ROS name, with each name.
+    """Yield each operation whose requests contain a ROS name, with each name.
 
     Args:
         operations: the description's.
@@ -60,7 +60,7 @@ def named_in_requests(operations: Sequence[Operation], ends: Mapping[str, dict[s
 
 
 def place_of(document: Any, fields: set[str], at: str = "") -> str | None:
-    """Return where a document has an object with these fields, and no others; None: nowhere."""
+    """Return where a document has an object with these fields, and no others; None means nowhere."""
     if not isinstance(document, dict):
         return None
     if fields and document.keys() == fields:

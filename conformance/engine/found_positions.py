@@ -198,12 +198,12 @@ class PositionFinder(Finder):
         return False
 
     def _limits(self, number: Commanded) -> tuple[float, float] | None:
-        """Return the limits of a position that are declared, or read beside it; or None."""
+        """Return the limits of a position that are declared, or that the same reading contains; or None."""
         told = bounds_of(self._schemas[number.name])
         return told or (None if self._relative else number.bounds) or self._limits_beside(number.name)
 
     def _limits_beside(self, name: str) -> tuple[float, float] | None:
-        """Return the limits that a reading has beside a position; or None."""
+        """Return the limits that a reading contains for a position; or None."""
         read, place = self._places[name]
         beside = place.rpartition("/")[0]
         for least, most in _LIMITS:
@@ -232,11 +232,11 @@ class PositionFinder(Finder):
 
         Args:
             start: where they were at first.
-            ways: how far from there; 0: back.
+            ways: how far from there; 0 means back.
             sizes: how far they are sent at most, by which it is judged whether one is there.
 
         Returns:
-            None: it was refused.
+            None if it was refused.
         """
         rested = self._clock.now()
         self._watch(_BEFORE_S)
@@ -367,7 +367,7 @@ class PositionFinder(Finder):
         yield from self._stop_lines(1.0, "the suite's")
 
     def _fastest(self, number: Commanded) -> float:
-        """Return the greatest speed of a move that is declared in the unit of its axis; 0: none is."""
+        """Return the greatest speed of a move that is declared in the unit of its axis; 0 if none is."""
         unit = self._unit(number)
         speeds = (Commanded("", *one, turns=False) for one in numbers_in(body_schema(self._plan.drive) or {}))
         known = (one for one in speeds if FAST.search(one.place) and one.bounds and one.has_unit)

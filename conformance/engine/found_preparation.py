@@ -61,7 +61,7 @@ class Preparing:
     """What a device wants before it moves.
 
     Attributes:
-        lease: what a client must hold; None: nothing.
+        lease: what a client must hold; None if there is none.
         steps: commands in order, each with those that end what it began.
     """
 
@@ -195,13 +195,13 @@ def wants_lease(operation: Operation) -> bool:
 
 
 def lease_parameter(operation: Operation, *places: str) -> str:
-    """Return the name of the header or query parameter in which an operation takes a lease; empty: in none."""
+    """Return the name of the header or query parameter in which an operation takes a lease; empty if there is none."""
     found = (one.name for place in places or ("header", "query") for one in operation.parameter(place))
     return next(filter(_carries_lease, found), "")
 
 
 def lease_place(operation: Operation) -> str:
-    """Return the JSON pointer of a text in an operation's body that names a lease; empty: none does."""
+    """Return the JSON pointer of a text in an operation's body that names a lease; empty if none does."""
     for part in parts_of(body_schema(operation)):
         for name, member in part.get("properties", {}).items():
             if _carries_lease(name) and any(one.get("type") == "string" for one in parts_of(member)):
@@ -237,7 +237,7 @@ def _is_lease(operation: Operation) -> bool:
 
 
 def _lease_of(acquire: Operation, operations: Sequence[Operation]) -> Lease:
-    """Return a lease with the operations beside its acquisition that renew and release it."""
+    """Return a lease with the operations that acquire, renew and release it."""
     path = acquire.template
     folder = posixpath.dirname(path)
     beside = [one for one in operations if one.template == path or one.template.startswith(f"{path.rstrip('/')}/")]
@@ -283,7 +283,7 @@ def _body(operation: Operation, *, on: bool | None = None) -> Any:
 
 
 def _switch_value(member: Any, *, on: bool) -> Any:
-    """Return the value of a member that switches something on or off; None: it has none."""
+    """Return the value of a member that switches something on or off; None if it has none."""
     for part in parts_of(member):
         if part.get("type") == "boolean":
             return on
@@ -295,7 +295,7 @@ def _switch_value(member: Any, *, on: bool) -> Any:
 
 
 def _ready_step(operation: Operation, word: str) -> Step | None:
-    """Return the step by which an operation makes a device ready; None: it does not, by this word."""
+    """Return the step by which an operation makes a device ready; None if it does not, by this word."""
     words = _words(operation)
     body = _body(operation, on=True)
     # PUT /motors {"enabled": true}
@@ -306,7 +306,7 @@ def _ready_step(operation: Operation, word: str) -> Step | None:
 
 
 def _ends(operation: Operation, step: Step, operations: Sequence[Operation]) -> tuple[Step, ...]:
-    """Return the step that ends what another one began; empty: there is none."""
+    """Return the step that ends what another one began; empty if there is none."""
     off = _body(operation, on=False)
     if step.body is not None and step.body == _body(operation, on=True) != off:
         return (Step(operation.label, off),)

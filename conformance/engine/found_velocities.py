@@ -275,7 +275,7 @@ class VelocityFinder(Finder):
 
     @property
     def _reversed_text(self) -> str:
-        """What is said of numbers that moved against the sign of a velocity; empty: none did."""
+        """What is said of numbers that moved against the sign of a velocity; empty if none did."""
         return f"; against the sign that was commanded moved {', '.join(self._other_way)}" if self._other_way else ""
 
     def _choose(
@@ -527,14 +527,14 @@ class VelocityFinder(Finder):
 
 
 def _scale(number: Commanded, place: str, ratio: float) -> float:
-    """Return how fast a position must change at velocity 1: without a unit nobody says more than what was seen."""
+    """Return how fast a position must change at velocity 1: by the unit, or as measured if none is declared."""
     if ANGLE in place and unit_of(number.place, number.schema) == "deg":
         return round(math.radians(1), 6)
     return _unit(ratio)[0] if number.has_unit else float(f"{ratio:.3g}")
 
 
 def _unit(ratio: float) -> tuple[float, tuple[str, str]]:
-    """Return the factor of a velocity and the name of its unit; the ratio, if the unit is unknown."""
+    """Return a velocity's units per m/s or rad/s and the unit's name; the measured ratio if no unit is near."""
     near = min(_UNITS, key=lambda unit: abs(math.log(abs(ratio) / unit)))
     if abs(math.log(abs(ratio) / near)) < math.log(_NEAR):
         return near, _UNITS[near]

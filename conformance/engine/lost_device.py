@@ -1,4 +1,4 @@
-"""A device that stopped responding: wait for it, restart it, and find the request, and the part of it, that did it."""
+"""Wait for a device that stopped responding, restart it, and find the request, and its part, that caused it."""
 
 import json
 import shlex

@@ -24,7 +24,7 @@ def check_map(run: Run, statement: Path | None) -> None:
 
     Args:
         run: with the map and the contract of a device that has an OpenAPI description.
-        statement: the file that has the map, to name the line; None: there is none.
+        statement: the file that has the map, to name the line; None if there is none.
 
     Raises:
         StatementError: it forbids one.

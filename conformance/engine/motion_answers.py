@@ -1,4 +1,4 @@
-"""The four questions that a user of a moving device asks first, answered by a run: with a figure and a picture each."""
+"""Answer the first four questions on a device's motion by a run's traces, each with a figure and a picture."""
 
 from __future__ import annotations
 

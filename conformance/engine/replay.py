@@ -144,7 +144,7 @@ def replay_and_stop(
         result: the result.
         connection: settings for the robot's clients.
         contract: the contract that judged, or None.
-        minutes: for how long requests are sent at most, min; None: as `longest_s` returns.
+        minutes: for how long requests are sent at most, min; None means as `longest_s` returns.
 
     Returns:
         What came of each, and why the robot may still move, or an empty text.
@@ -228,7 +228,7 @@ def judged_by_checks(
         allow_motion: whether the robot may be moved.
         seed: seed of everything random, as in the recorded run.
         effort: effort of the recorded run.
-        minutes: for how long the checks send requests at most, min; None: half an hour.
+        minutes: for how long the checks send requests at most, min; None means half an hour.
 
     Returns:
         The content of a result.json with these requirements.

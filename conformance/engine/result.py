@@ -38,7 +38,7 @@ class _Remedy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         words: such as "behind nginx"; a text follows that says what is met.
         meets: ids of the rules that are met then.
-        servers: how the Server field begins, in lower case; empty: any server.
+        servers: how the Server field begins, in lower case; empty means any server.
     """
 
     words: Text
@@ -61,7 +61,7 @@ def web_server(verdicts: Sequence[Verdict], server: str) -> dict[str, Any]:
 
     Args:
         verdicts: on the rules of the class.
-        server: the value of the Server field; empty: the server sends none.
+        server: the value of the Server field; empty if the server sends none.
     """
     judged = [verdict for verdict in verdicts if verdict.evidence.cases]
     if not judged:

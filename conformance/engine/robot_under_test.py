@@ -437,7 +437,7 @@ class RobotUnderTest:
         return _GRACE_S + _GRACE_ANSWERS * self.connection.pace.usual_s
 
     def _responds(self, within_s: float) -> bool:
-        """Return whether the robot responds, on any interface that responded at the start, within so many seconds."""
+        """Return whether an interface that responded at the start responds within the given seconds."""
         until = time.monotonic() + within_s
         # These requests judge nothing, and did not cause the robot's silence.
         silent = self.connection.unheard(recent=deque(), sent=0, is_away=self._is_of_gateway)

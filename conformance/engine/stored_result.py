@@ -251,7 +251,7 @@ def findings(result: Mapping[str, Any], chosen: str | None) -> Iterator[tuple[st
 
     Args:
         result: the result.
-        chosen: only those of this requirement (by any id that it had), or the one with this number; None: all.
+        chosen: only those of this requirement (by any id that it had), or the one with this number; None means all.
     """
     known = generic_ledger().get(chosen or "")
     names = {chosen, *(known.aliases if known else ())}

@@ -31,7 +31,7 @@ class Member(msgspec.Struct, frozen=True):
         identity: name and vendor, as on its certificate.
         baseline: file of its expected failures, or None.
         movable: whether it may be moved, if the command allows motion.
-        time_limit_s: time after which its run is aborted, s; None: the default.
+        time_limit_s: time after which its run is aborted, s; None means the default.
     """
 
     name: str

@@ -77,11 +77,11 @@ class Sent(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", t
         client: the client that sent it, as the suite's threads are called.
         connection, place, attempt: as in Passage.
         sent_s, first_s, ended_s: when sending began, the first octet came (0: none did), and the last one.
-        within_s: the deadline; 0: no response was waited for.
+        within_s: the deadline; 0 if no response was waited for.
         method, url, query, headers, body: of the request, with variables in place of credentials.
         raw: the bytes on the socket, if they were written by hand.
         whole: whether all of the request was sent.
-        came: the response; None: there was none, or it was not parsed.
+        came: the response; None if there was none, or it was not parsed.
         octets: what a raw socket received, as it came.
         problem, kind: what happened instead of a response.
         heard: whether the response is judged by the rules for every response.

@@ -1,4 +1,4 @@
-"""How the numbers that a device tells respond while it is driven: as a velocity, as a position, or not at all."""
+"""Find how a device's numbers change while it is driven: as a velocity, as a position, or not at all."""
 
 from __future__ import annotations
 

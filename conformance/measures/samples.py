@@ -97,12 +97,12 @@ def goes_on(
     rate: Callable[[Sequence[Sample]], float | None],
     most: Callable[[Sequence[Sample]], float],
 ) -> float:
-    """Return how fast something moves on and on, per second; 0 if it rests, comes to rest, or sways.
+    """Return the rate per second of something that moves all the time in one direction; else 0.
 
     Args:
         samples: of at least one second or so.
-        rate: returns the rate that some samples show; None: they do not show it.
-        most: returns the rate that such samples of something at rest may show: each third of the time must show more.
+        rate: returns the rate of some samples; None if they are too few.
+        most: returns the greatest rate that noise may cause at rest; each third of the samples must exceed it.
     """
     if len(samples) < SEVERAL * SEVERAL:
         return 0.0

@@ -24,7 +24,7 @@ class Fault:
     Attributes:
         cause: faults of the same cause are told once.
         observed: what the response shows, as a noun phrase.
-        expected: what it should be, as a noun phrase; empty: that of the rule.
+        expected: what it should be, as a noun phrase; empty means that of the rule.
         doubt: as in Case.
     """
 

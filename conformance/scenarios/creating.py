@@ -74,7 +74,7 @@ def makes_room(api: RestInterface, refused: Exchange) -> bool:
 
 
 def location_of(api: RestInterface, read: Operation, made: Exchange) -> str:
-    """Return the path of a created thing, as far as the response tells its location, or an empty text."""
+    """Return the path of a created thing if the response contains it; else an empty text."""
     sent, answer = made.request.url, made.response
     location, targets = answer.header("location"), []
     if location and is_same(joined(sent, location), sent):

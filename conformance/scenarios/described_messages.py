@@ -113,7 +113,7 @@ class DescribedMessages:
             turn: which of the given values to use, in rotation.
             given: further values, which the device gave, by what they are called.
             current: values to keep, by name in lower case, as far as they are valid together.
-            form: with all optional parts, in this form (see `ordinary`); None: without them, if that is valid.
+            form: with all optional parts, in this form (see `ordinary`); None means without them, if that is valid.
 
         Raises:
             NotPossibleError: none can be made.

@@ -206,7 +206,7 @@ def _end_active(writer: Writer, kind: Ended, path: str) -> None:
 def _begin_together(
     writer: Writer, kind: Ended, create: Operation, operations: _Operations, pauses: list[Operation]
 ) -> str:
-    """Begin two things by two clients at once, and one while another is paused, of which one has to be refused.
+    """Start two things by two clients at once, and one while another is paused: each time one must be refused.
 
     Return the path of one that is active.
     """
@@ -323,7 +323,7 @@ class Deletion:
         operation: label of the DELETE.
         deleted: the DELETE.
         user: the read of the thing that refers to it, after the DELETE.
-        fault: what is wrong, as a noun phrase; empty: nothing.
+        fault: what is wrong, as a noun phrase; empty if there is none.
     """
 
     operation: str

@@ -66,7 +66,7 @@ class Estimate:
     waits_s: float = 0.0
 
     def seconds(self, usual_ms: float) -> float:
-        """Return how long the run takes where the device needs so many milliseconds for an answer, s."""
+        """Return the duration of the run, s, for a device that needs the given milliseconds for a response."""
         in_turn = self.requests - self.at_once * (1 - 1 / _READS)
         return _START_S + self.waits_s + (in_turn * (usual_ms + _OWN_MS) + self.drawn * _DRAWN_MS) / 1000
 

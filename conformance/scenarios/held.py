@@ -94,7 +94,7 @@ class _Held:
                 self._call(ending, text)
 
     def _create(self) -> str:
-        """Create a thing for it; return where it is, or nothing."""
+        """Create a thing for the operation; return its path, or nothing."""
         create = self.operations.get(("POST", collection_of(self.item)))
         read = self.operations.get(("GET", self.item))
         return created_path(self.surveyor, create, read) if create is not None and read is not None else ""

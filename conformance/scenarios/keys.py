@@ -67,7 +67,7 @@ class Keyed:
         way: what is special about it: the same request, another body, or a new key.
         shown: the response that decides.
         expected: what should have come of it, as a noun phrase.
-        fault: what came of it instead; empty: that.
+        fault: what came of it instead; empty means that.
     """
 
     operation: str

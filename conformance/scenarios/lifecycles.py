@@ -343,7 +343,7 @@ class _Cycle:
             self.writer.send(self.read, path[: number.start()] + text + path[number.end() :])
 
     def _create_at_once(self, delete: Operation, count: int) -> None:
-        """Create things by two clients at the same moment, of which each gets its own, and delete them."""
+        """Create a thing by each of two clients at the same moment, and delete both."""
         writer, turns = self.writer, [count * self.round + _AT_ONCE + number for number in range(_CLIENTS)]
         if self.create.method != "POST" or not self.living.of(State.GONE) or self.living.is_over:
             return

@@ -122,7 +122,7 @@ def searches(listing: Listing, page: Page) -> Iterator[dict[str, Any]]:
 
 
 def _together(listing: Listing, page: Page) -> list[dict[str, Any]]:
-    """Return values of pairs of parameters, each of which excludes an item that the other one keeps."""
+    """Return values for pairs of parameters: each excludes an item that the other one keeps."""
     items = [members_of(one) for one in page.items]
     kept = [
         (parameter.name, value, {place for place, item in enumerate(items) if item.get(name) == value})

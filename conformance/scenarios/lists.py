@@ -75,14 +75,14 @@ _ENDS: Final = re.compile(
 
 @dataclass(frozen=True)
 class Paged:
-    """Parts of a list beside the list.
+    """A list that was read in parts, and as a whole.
 
     Attributes:
         operation: label of the operation.
         way: how the parts were asked for.
         found: the last request for a part.
         expected: what the part should have, as a noun phrase.
-        fault: what it had instead; empty: what it should have.
+        fault: what it had instead; empty means what it should have.
         doubt: as in Case.
     """
 
@@ -417,7 +417,7 @@ class _Parts:
         return self._page_case(offset.name, part[0], f"no item of the first page, by {offset.name}={far}", fault)
 
     def _last(self, whole: Page) -> Paged | None:
-        """Read the last two items, where a total tells where they are."""
+        """Read the last two items, if a total shows where they are."""
         offset, end = self.reader.listing.offset, max(whole.totals.values(), default=0)
         is_later = end > len(whole.items) and not self.reader.always and fitting(offset, end - _FEWEST)
         part = self.reader.part({offset.name: end - _FEWEST}) if offset is not None and is_later else None
@@ -481,7 +481,7 @@ class _Parts:
         return next((size for size in sizes if fitting(self.reader.listing.limit, size)), 0)
 
     def _count(self, whole: Page) -> int:
-        """Return how many items the pages have together: all of the list, as far as its totals tell."""
+        """Return the number of items in all pages: those of the whole list, or a greater total that it reports."""
         count, limit = len(whole.items), self.reader.listing.limit
         page = max(count, min(int(flat(limit.schema).get("maximum", 0)), _LARGE)) if limit is not None else count
         known = () if self.reader.always else (total for total in whole.totals.values() if total <= _PAGES * page)
@@ -493,7 +493,7 @@ class _Parts:
         Args:
             whole: the list.
             way: name of the parameter.
-            where: returns the parameter by the number of items and of pages read; None: the page before names it.
+            where: returns the parameter by the number of items and of pages read; None if the page before names it.
         """
         limit, size = self.reader.listing.limit, self._size(whole)
         if limit is None or not size:

@@ -65,7 +65,7 @@ class Look:
         operation: label of the request before it.
         found: the response that shows it.
         expected: what should have been found, as a noun phrase.
-        other: what was found instead; empty: it was as expected.
+        other: what was found instead; empty if it was as expected.
         after_s: how long after the creation it was.
         doubt: as in Case.
     """
@@ -81,19 +81,19 @@ class Look:
 
 @dataclass(frozen=True)
 class Life:
-    """The recorded life of a thing that was created, or that always exists and was written.
+    """The recorded life of a thing that was created, or of one that always exists and was written.
 
     Attributes:
         create, read, delete: labels of the operations; an empty one was not sent.
-        created: the request that created it.
+        created: the request that created the thing.
         found: the GET after it.
         deleted: the DELETE, or None.
-        gone: the GET after that, or None.
-        id: what identifies it by the response that created it; empty if that does not say it.
-        found_id: what identifies it by the GET; empty if that does not say it.
+        gone: the GET after the DELETE, or None.
+        id: its identifier in the response to the creation; empty if the response has none.
+        found_id: its identifier in the response to GET; empty if the response has none.
         writes: what was written to it, the creation first.
-        looks: what was seen later, of this thing and of others.
-        doubt: why it may be read although it was deleted; empty: it may not.
+        looks: later reads of this thing and of others.
+        doubt: why GET may still return it after the DELETE; empty if GET must not.
     """
 
     create: str
@@ -348,7 +348,7 @@ class Living:
         return ""
 
     def _look_at_order(self, operation: str) -> None:
-        """Compare the order of the list with that in which its things were created, if its description tells it."""
+        """Compare the order of the list with the order of creation, if the description promises that order."""
         said = IN_TIME.search(self.lister.text) if self.lister is not None else None
         if said is None or self.listing is None:
             return

@@ -142,7 +142,7 @@ def _wrong(things: _Things, sent: dict[str, Exchange]) -> _Things:
 
 
 def _delete_things(api: RestInterface, sent: dict[str, Exchange]) -> _Things:
-    """Delete things that were read: so many that a thing with each declared value of a member is deleted."""
+    """Delete things that were read: for each declared value of a member, one that has it."""
     covered, found = set[tuple[str, ...]](), _Things()
     for path, exchange in sent.items():
         read, delete = (matching(api.run.contract, method, path) for method in ("GET", "DELETE"))

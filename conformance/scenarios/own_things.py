@@ -69,7 +69,7 @@ _OTHERS: Final = 4
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
 def own_things(api: RestInterface, values: Values) -> Survey:
-    """Create a thing of each collection; write to it by right and wrong conditions, and ask by undeclared methods."""
+    """Create a thing of each collection; write to it with right and wrong conditions; send undeclared methods."""
     operations = callable_operations(api)
     surveyor = Surveyor(api, values)
     for (method, path), read in operations.items():
@@ -83,7 +83,7 @@ def own_things(api: RestInterface, values: Values) -> Survey:
             is_item = bool(read.parameter("path"))
             make = _put if create is not None and create.method == "PUT" else created_path
             thing_path = make(surveyor, create, read) if is_item and create is not None and collection_of(path) else ""
-            # Without a way to create one, what is there is written, and restored.
+            # If nothing can be created here, an existing thing is changed and restored.
             is_fixed = not is_item or (bool(collection_of(path)) and (create is None or make is _put))
             free = [operation for operation in changes if not is_item or is_free(operation, path)]
             if free and is_fixed and not thing_path:
@@ -190,7 +190,7 @@ class _Thing:
         self.get()
 
     def write(self, changes: list[Operation]) -> None:
-        """Write to it by wrong conditions and by right ones, one member at a time."""
+        """Write one member at a time, with wrong conditions and with right ones."""
         first = self.get()
         if not first.ok or first.exchange is None:
             return
@@ -477,7 +477,7 @@ class _Thing:
                 self.surveyor.send(read, odd, whole)
 
     def _look_again(self, read: Operation, request: Outgoing, earlier: list[bytes]) -> None:
-        """Read a file while it is an earlier one, until the time for that is over."""
+        """Read a file until it is no longer the earlier one, or the time for that is over."""
         began, again = time.monotonic(), Variation(Kind.AGAIN, "", "", Inputs())
         while (found := self.surveyor.send(read, again, request).exchange) and found.response.body in earlier:
             if time.monotonic() - began > _SETTLES_S:
@@ -549,7 +549,7 @@ class _Thing:
         return (("If-Match", tags),) if self.tag and not self.tag.startswith("W/") else ()
 
     def delete(self, delete: Operation | None, lister: Operation | None) -> None:
-        """Delete it by a wrong condition, and then by a right one; look for it in the list by each of its filters."""
+        """Send DELETE with a wrong condition, then with a right one; look for the thing in the list by each filter."""
         if delete is None or not self.get().ok:
             return
         was, began = members(self.last, ()) if self.last is not None else {}, time.monotonic()

@@ -57,7 +57,7 @@ class Rule:
 
     @property
     def fixtures(self) -> tuple[str, ...]:
-        """The names of the fixtures that the function takes beside the trace."""
+        """The names of the fixtures that the function takes besides the trace."""
         return tuple(inspect.signature(self.judge).parameters)[1:]
 
     def outcomes(self, trace: Any, fixture: Callable[[str], Any]) -> list[Outcome]:

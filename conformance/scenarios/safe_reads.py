@@ -53,7 +53,7 @@ class Watched:
         operation: label of the operation that reads it.
         shown: the request that has changed it, or the read that shows it.
         expected: what should have been read, as a noun phrase.
-        fault: what was read; empty: that.
+        fault: what was read; empty means that.
         is_safe: whether the requests were safe.
     """
 
@@ -71,7 +71,7 @@ class _Resource:
     Attributes:
         read: reads it.
         path: where it is.
-        write: writes it; None: it can only be created.
+        write: writes it; None if it can only be created.
         names: its members that clients write.
         delete: deletes it, if this run has created it; None otherwise.
         first: these members as they were before this run's own write, if it has written them.

@@ -163,7 +163,7 @@ class _Changes:
             yield "values in another form of their types", Kind.VARIED, made, octets, "utf-8"
 
     def _ends(self, act: Act, node: Node, free: _Leaves, readers: list[_Message]) -> None:
-        """Write the longest and the shortest values, INF and NaN, and read what comes of it."""
+        """Write the longest and the shortest values, INF and NaN, and read them back."""
         until = time.monotonic() + _BUDGET_S
         ends = [("the longest values", extreme), ("empty texts and negative numbers", shortest)]
         ends += [(f"{number} as each number", partial(boundless, number=number)) for number in ("INF", "NaN")]
@@ -185,7 +185,7 @@ class _Changes:
                         break
 
     def _parts(self, act: Act, declared: Element, node: Node, free: _Leaves, readers: list[_Message]) -> None:
-        """Write messages without a part, with other numbers of parts, and of derived types; read what comes of it."""
+        """Write messages without a part, with other numbers of parts, and of derived types; read the result."""
         until = time.monotonic() + _BUDGET_S
         names = {node.at(path).name.lower() for path, _ in free} | act.inherited
         # What is left out has to keep a value that is not the first one, which a device may go back to.

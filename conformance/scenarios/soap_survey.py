@@ -88,7 +88,7 @@ class SoapProbe:
         kind: what it shows.
         says: what is special about it, as a noun phrase.
         envelope: namespace of the port's SOAP version.
-        response: tag of the element that a success has in its Body; None: one-way.
+        response: tag of the element that a success has in its Body; None means one-way.
         exchange: request and response, or None.
         unanswered: the request without a response, or None.
     """

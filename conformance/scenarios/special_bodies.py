@@ -219,7 +219,7 @@ def _telling(schema: Schema, value: Any, turn: int) -> Iterator[Any]:
 def _nulls(
     parts: Schema, read: Operation, now: Callable[[], dict[str, Any]], values: Values, may: Callable[[str], bool]
 ) -> Iterator[dict[str, Any]]:
-    """Yield merge patches that remove members beside another change, and one that changes a part of an object."""
+    """Yield merge patches that remove a member and change another one, and one that changes a part of an object."""
     needed, removable = flat(read.shape or {}).get("required", ()), _removable(parts, read)
     own = {name for name, part in parts.items() if is_devices(name, part, frozenset())} - removable
     absent = [name for name in parts if now().get(name) is None and name not in own]
@@ -289,7 +289,7 @@ def _removable(parts: Schema, read: Operation) -> frozenset[str]:
 def _patches(
     schema: Schema, read: Operation, now: Callable[[], dict[str, Any]], values: Values, may: Callable[[str], bool]
 ) -> Iterator[list[dict[str, Any]]]:
-    """Yield JSON patches: right ones, and ones of which an operation fails at the beginning or at the end."""
+    """Yield JSON patches: right ones, and ones whose first or last operation fails."""
     parts = parts_of(read.shape or {})
     first = {name: one for name, one in now().items() if name in parts and may(name)}
     first = {name: one for name, one in first.items() if not is_devices(name, parts[name], values.collections)}

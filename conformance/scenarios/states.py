@@ -93,7 +93,7 @@ class _Walker:
             self._go(way)
 
     def _next(self) -> str | None:
-        """Return the operation to send now, "" to wait for a change; None: nothing is left that can be reached."""
+        """Return the operation to send now, "" to wait for a change; None if nothing is left that can be reached."""
         untried = [name for name in self._map.operations if not self._is_done(name, self.here)]
         refused = [name for name in untried if not self._map.operations[name].is_taken_in(self.here)]
         # Operations that leave the state come last.

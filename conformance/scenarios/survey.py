@@ -206,8 +206,8 @@ class Surveyor:
         Args:
             operation: that it is for.
             variation: what is special about it.
-            request: as it is written; None: by the variation's inputs.
-            fresh: on a connection of its own; None: the usual requests, and one of several others.
+            request: as it is written; None means by the variation's inputs.
+            fresh: on a connection of its own; None means the usual requests, and one of several others.
 
         Raises:
             PartialTraceError: the device does not respond any more.
@@ -298,7 +298,7 @@ class Surveyor:
             self.api.is_recorded = False
 
     def look_elsewhere(self, operation: Operation) -> None:
-        """Where an operation's usual requests were all answered 404, get a path beside it that is not described."""
+        """If all usual requests of an operation were answered 404, GET an undescribed path next to it."""
         if not has_input(operation) or self.api.usual_status.get(operation.label) != _NOT_FOUND:
             return
         usual = [probe for probe in self.probes if probe.kind is Kind.USUAL and probe.operation == operation.label]
@@ -324,7 +324,7 @@ class Surveyor:
                 return
 
     def _candidates(self, operation: Operation) -> Iterator[Inputs]:
-        """Yield inputs of the usual request; last, those with a demanded condition, a new thing, or what is there."""
+        """Yield inputs of the usual request; last those with a required condition, a new thing, or an existing one."""
         tried, statuses = usual_inputs(operation, self.values)[:4], self.api.usual_status
         yield from tried
         if statuses.get(operation.label) in WANTS_CONDITION and not operation.safe:
@@ -451,7 +451,7 @@ class Surveyor:
                     self.send(operation, Variation(Kind.AGAIN, "", "", deleted))
 
     def try_again(self, operations: Sequence[Operation]) -> None:
-        """Send valid requests that were refused once more in another state, by other values of settings beside them."""
+        """Send refused valid requests again in another state, after settings next to them were changed."""
         by_label = {item.label: item for item in operations}
         enums = [probe for probe in self.probes if probe.ok and probe.kind is Kind.ENUM and probe.operation in by_label]
         refused = [

@@ -47,7 +47,7 @@ class Table:
     Attributes:
         operation: label of the operation that lists.
         shown: the response with CSV.
-        fault: what is otherwise than in JSON, as a noun phrase; empty: nothing.
+        fault: what is otherwise than in JSON, as a noun phrase; empty if there is none.
         expected: what should be there.
     """
 

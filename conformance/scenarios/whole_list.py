@@ -106,7 +106,7 @@ def _seems_cut(lister: Operation, page: Page, sent: Mapping[str, Any]) -> bool:
 
 
 def read_numbers(writer: Writer, lister: Operation | None, path: str) -> None:
-    """Read a list and the thing above or beside it until the numbers in both agree, or the time for that is over."""
+    """Read a list, and the resource that counts its items, until both agree or the time is over."""
     template = lister.template.rstrip("/") if lister is not None else ""
     known, path = callable_operations(writer.api), path.rstrip("/")
     above = known.get(("GET", template.rpartition("/")[0]))

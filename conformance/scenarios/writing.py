@@ -41,7 +41,7 @@ class Write:
         sent: the request that wrote.
         found: the GET after it.
         other: what reads in another way than it was written, as noun phrases.
-        doubt: why it may, by the descriptions of the operations; empty: it may not.
+        doubt: why it may, by the descriptions of the operations; empty if it may not.
     """
 
     operation: str

@@ -54,7 +54,7 @@ class ServiceLevel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         p50_ms, p90_ms, p95_ms, p99_ms, p999_ms: limits on quantiles of the response time, ms.
         error_rate: highest share of requests that may fail, 0 to 1.
-        at_rate: requests per second of this operation at which the level holds; None: at any rate.
+        at_rate: requests per second of this operation at which the level holds; None means at any rate.
     """
 
     p50_ms: Positive | None = None

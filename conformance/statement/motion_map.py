@@ -34,13 +34,13 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         at: where its position is in the response.
         limits: least and greatest target, in ``unit``.
         unit: for readers, such as rad, m or %.
-        speed: the greatest speed on the way to a target, units per second; None: not declared.
-        tolerance: how far from its target it may rest; None: that of the move.
+        speed: the greatest speed on the way to a target, units per second; None if not declared.
+        tolerance: how far from its target it may rest; None means that of the move.
         noise: standard deviation of its position as it is read; what a reading shows at rest counts as well.
-        rest: how fast it may seem to move at rest, units per second; None: a fifth of its tolerance.
+        rest: how fast it may seem to move at rest, units per second; None means a fifth of its tolerance.
         angle: it turns freely, in rad, or in deg or h by its unit: the angle of this name, of a quaternion or as a
-            number; empty: it does not. Its limits say which targets are tried.
-        read: the operation that says where it is; empty: that of the state.
+            number; empty if it does not. Its limits say which targets are tried.
+        read: the operation that says where it is; empty means that of the state.
         bound: whether it must stay within its limits on its ways; else they only say which targets are tried.
         accepts: least and greatest target that the device accepts, where ``limits`` only say which are tried.
     """
@@ -129,14 +129,14 @@ class Goto(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         send: the operation.
-        body: its JSON, a template; None: it has no body.
+        body: its JSON, a template; None if it has no body.
         relative: whether it takes the way from where the device is, in place of the position.
         tolerance: how far from its target an axis may rest, in the axis's unit.
         seconds: the duration that the suite asks for, where a template has "{seconds}".
         within_s: time to reach any target, where no template has "{seconds}".
         settle_s: time beyond either, s.
         beyond_limits: what the device does with a target beyond its limits: "refused", "clamped", or "undefined".
-        while_moving: what a second move does: it "displaces" the first, or is "refused"; None: nobody says it.
+        while_moving: what a second move does: it "displaces" the first, or is "refused"; None if nobody says it.
     """
 
     send: Call
@@ -172,12 +172,12 @@ class Speed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         limits: least and greatest, in units per second.
-        at: where the state's response has the measured velocity; empty: it is the change of the axis ``of``.
+        at: where the state's response has the measured velocity; empty if it is the change of the axis ``of``.
         of: the axis that it changes.
         scale: how fast the axis ``of`` changes at velocity 1, in its unit per second.
-        tolerance: how far the measured velocity may be off; None: that of the command.
+        tolerance: how far the measured velocity may be off; None means that of the command.
         noise: standard deviation of the measured velocity; what a reading shows at rest counts as well.
-        rest: the measured velocity at rest, at most; None: a tenth of its tolerance.
+        rest: the measured velocity at rest, at most; None means a tenth of its tolerance.
     """
 
     limits: tuple[Finite, Finite]
@@ -205,7 +205,7 @@ class Way(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         send: the operation.
-        body: a template; None: it has no body.
+        body: a template; None if it has no body.
         media_type: in which the body is written.
         root: the name of the root element, of XML.
     """
@@ -237,11 +237,11 @@ class Velocity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         send: the operation.
-        body: its JSON, a template; None: it has no body.
+        body: its JSON, a template; None if it has no body.
         axes: by name, as templates name them.
         tolerance: how far the measured velocity may be off, in units per second.
         settle_s: time to reach a velocity, and to rest, s.
-        hold_s: how long the device goes on after the last command, s; None: until another command comes.
+        hold_s: how long the device goes on after the last command, s; None means until another command comes.
         beyond_limits: what the device does with a velocity beyond its limits: "refused", "clamped", or "undefined".
         ways: other ways to give it a velocity, or a part of one.
     """
@@ -263,8 +263,8 @@ class Switch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         send: the operation.
         at: where the state's response has its value.
         values: what is sent, in any order.
-        read: the operation that says it; empty: that of the state.
-        body: JSON of the command, a template with "{value}"; None: it has no body.
+        read: the operation that says it; empty means that of the state.
+        body: JSON of the command, a template with "{value}"; None if it has no body.
         shows: what is read for a value that was sent, where it is another.
         within_s: time until it is there, s.
     """
@@ -283,7 +283,7 @@ class Stop(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         send: the operation.
-        body: its JSON, a template; None: it has no body.
+        body: its JSON, a template; None if it has no body.
         rests_within_s: time from the request until the device rests, s.
     """
 
@@ -298,12 +298,12 @@ class Lease(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         acquire: the operation that gives it.
         body: JSON of that, or None.
-        token: where the response has its value; empty: it has none.
-        header: the header in which commands carry it; empty: none.
-        renew: the operation that keeps it; empty: nothing does.
+        token: where the response has its value; empty if it has none.
+        header: the header in which commands carry it; empty if there is none.
+        renew: the operation that keeps it; empty if nothing does.
         renew_body: JSON of that, or None.
         every_s: so often it must be renewed, s.
-        release: the operation that gives it back; empty: there is none.
+        release: the operation that gives it back; empty if there is none.
         release_body: JSON of that, or None.
     """
 
@@ -324,7 +324,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         send: the operation.
         body: JSON, or None.
-        read: the operation that says when it is done; empty: at once.
+        read: the operation that says when it is done; empty means at once.
         at: where its response says it.
         shows: what it has there then.
         within_s: time until then, s.
@@ -355,13 +355,13 @@ class MotionMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         state: where it is.
-        goto: how it is sent to a position; None: not declared.
-        velocity: how it is given a velocity; None: not declared.
-        stop: how it is stopped; None: not declared, or by a velocity of zero.
-        action: what a move says of itself; None: not declared.
+        goto: how it is sent to a position; None if not declared.
+        velocity: how it is given a velocity; None if not declared.
+        stop: how it is stopped; None if not declared, or by a velocity of zero.
+        action: what a move says of itself; None if not declared.
         switches: what has a few states, by name.
-        failed: how a response of 200 says that its request failed; None: its status says it.
-        lease: what a client must hold meanwhile; None: nothing.
+        failed: how a response of 200 says that its request failed; None if its status says it.
+        lease: what a client must hold meanwhile; None if there is none.
         before: what is sent before the device can move, in order.
         after: what is sent last, in order.
     """

@@ -49,13 +49,13 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """How a message is written in the body of an operation.
 
     Attributes:
-        at: where the message is in the body; empty: the body is the message.
+        at: where the message is in the body; empty if the body is the message.
         fields: position in the web's message = position in the ROS message, where their names differ. What is under the
             position goes with it. Without it, all names are those of the message.
         values: values of the parameters in the path or query, by name: "PUT /speed?x={x}" has the parameter x.
         in_url: other parameters there = position in the ROS message; the body then has the rest of it, or nothing.
         body: other members of the body that the operation gets.
-        failure: how a 2xx response says that its request failed; None: by no value.
+        failure: how a 2xx response says that its request failed; None means by no value.
         timeout_s: time that the gateway has for a response, and for what the response stands for, s; None: 5 s, and how
             long it waits for a service that does not respond is not judged.
         type: of the message, service or action.
@@ -72,7 +72,7 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     @property
     def places(self) -> tuple[Pointer, ...]:
-        """Return the positions in the ROS message that a request has; empty: it has all."""
+        """Return the positions in the ROS message that a request has; empty if it has all."""
         return (*self.fields.values(), *self.in_url.values())
 
     @property
@@ -94,7 +94,7 @@ class Reads(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
         type: of its messages.
         absent: the statuses without a message: the topic has no publisher or no message, or the last is too old. Empty:
             not judged.
-        max_age_s: how old a message may be that the operation returns, s; None: as old as it gets.
+        max_age_s: how old a message may be that the operation returns, s; None means as old as it gets.
         stream: how it sends each message of the topic, once and in order; empty: it does not, it returns the last one.
         throttle_s: the least time between two messages of a stream, which leaves out those between, s; 0: it sends all.
     """
@@ -148,10 +148,10 @@ class Calls(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
         service: its full name.
         type: of the service.
         result: where the response of the service is in the response's body, or in that of ``state.read``.
-        id: where the call's id is in the response; None: at the end of its Location.
-        state: what the call says of itself until it has ended; None: the response to the call is its outcome.
-        unavailable: the statuses when the service is not there; empty: any that is no success.
-        too_late: the statuses when the service does not respond in time; empty: any that is no success.
+        id: where the call's id is in the response; None means at the end of its Location.
+        state: what the call says of itself until it has ended; None if the response to the call is its outcome.
+        unavailable: the statuses when the service is not there; empty means any that is no success.
+        too_late: the statuses when the service does not respond in time; empty means any that is no success.
     """
 
     service: Topic
@@ -169,13 +169,13 @@ class Acts(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
     Attributes:
         action: its full name.
         type: of the action.
-        id: where the goal's id is in the response; None: at the end of its Location.
-        state: what the goal says of itself; None: not judged.
-        feedback: where the last feedback is in the response of ``state.read``; None: nowhere.
-        result: where the result is in the response of ``state.read``; None: nowhere.
+        id: where the goal's id is in the response; None means at the end of its Location.
+        state: what the goal says of itself; None if not judged.
+        feedback: where the last feedback is in the response of ``state.read``; None means nowhere.
+        result: where the result is in the response of ``state.read``; None means nowhere.
         cancel: the operation that cancels the goal, a template: "{id}" is the goal's id.
         cancel_body: of that request, a template as well.
-        rejected: the statuses when the action server rejects a goal; empty: any error, or a state that says so.
+        rejected: the statuses when the action server rejects a goal; empty means any error, or a state that says so.
     """
 
     action: Topic
@@ -196,8 +196,8 @@ class Parameter(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
         parameter: its name.
         node: the node's full name.
         type: of its value: a name of rcl_interfaces/msg/ParameterType in lower case, without PARAMETER_.
-        sets: whether it sets the value; None: if its method is not GET.
-        refused: the statuses when the node refuses a value; empty: any error.
+        sets: whether it sets the value; None if its method is not GET.
+        refused: the statuses when the node refuses a value; empty means any error.
     """
 
     parameter: Annotated[str, Meta(pattern=r"^\S+$")]
@@ -216,10 +216,10 @@ class Lists(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         lists: what.
         at: where the array is in the body.
-        name: where the full name is in an item; empty: the item is the name.
-        type: where its type, or the list of its types, is in an item; None: nowhere.
-        of: the type whose names it has, where it has no others; empty: it has all.
-        hidden: whether names that are hidden (with a part that begins with "_") are listed; None: either.
+        name: where the full name is in an item; empty if the item is the name.
+        type: where its type, or the list of its types, is in an item; None means nowhere.
+        of: the type whose names it has, where it has no others; empty if it has all.
+        hidden: whether names that are hidden (with a part that begins with "_") are listed; None means either.
         timeout_s: time in which a change of the graph has to show, s.
     """
 
@@ -254,11 +254,11 @@ class _Forms(msgspec.Struct, frozen=True, kw_only=True):
     """Where a robot is, and how all its messages are written.
 
     Attributes:
-        domain_id: the robot's ROS domain; None: that of the environment.
+        domain_id: the robot's ROS domain; None means that of the environment.
         non_finite: how NaN and infinities are written: as null, as the strings "NaN", "Infinity" and "-Infinity", as a
-            bare NaN or Infinity, or not at all but refused with an error status; None: not judged.
-        integers: how integers of 64 bits are written; None: either, but exactly.
-        bytes: how uint8[] and byte[] are written; None: either.
+            bare NaN or Infinity, or not at all but refused with an error status; None if not judged.
+        integers: how integers of 64 bits are written; None means either, but exactly.
+        bytes: how uint8[] and byte[] are written; None means either.
     """
 
     domain_id: Annotated[int, Meta(ge=0, le=_MOST_DOMAINS)] | None = None
@@ -272,7 +272,7 @@ class RosMap(_Forms, frozen=True):
 
     Attributes:
         operations: by operation.
-        rosbridge: URL of the rosbridge that has these operations; empty: they are a web API's.
+        rosbridge: URL of the rosbridge that has these operations; empty if they are a web API's.
     """
 
     operations: dict[str, Operation]
@@ -286,7 +286,7 @@ class RosMap(_Forms, frozen=True):
 
     @property
     def calls(self) -> tuple[str, ...]:
-        """The operations that the map names: what is behind "#" only tells two tables of one operation apart."""
+        """The operations that the map names. A suffix "#..." only distinguishes two tables of one operation."""
         own = (call.partition("#")[0] for call in self.operations)
         return (*dict.fromkeys(own), *(call for one in self.operations.values() for call in followers(one)))
 

@@ -19,15 +19,15 @@ class Operation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename=
     """One operation.
 
     Attributes:
-        send: the operation of the description, where the map calls it by another name; empty: the name is it.
+        send: the operation of the description, where the map calls it by another name; empty if the name is it.
         taken_in: the states in which it is taken (``from``); in all others it must be refused. Empty: those of a table
             ``to``, or all.
         not_in: the states in which it is not sent: nobody says what comes of it there.
-        to: the state to which it leads, or a table of them by the state before; empty: the state stays.
+        to: the state to which it leads, or a table of them by the state before; empty if the state stays.
         via: states that may be shown on the way there, in this order.
-        within_s: time for that, s; None: that of the map.
-        body: of the request; None: it has none, or the usual message of a WSDL.
-        refusal: the statuses of a refusal; empty: any that is no success.
+        within_s: time for that, s; None means that of the map.
+        body: of the request; None if it has none, or the usual message of a WSDL.
+        refusal: the statuses of a refusal; empty means any that is no success.
     """
 
     send: Call | Literal[""] = ""
@@ -60,7 +60,7 @@ class Change(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         to: the states that may follow.
-        within_s: time in which one of them does, s; None: it may never.
+        within_s: time in which one of them does, s; None if it may never.
     """
 
     to: tuple[State, ...]
@@ -73,7 +73,7 @@ class StateMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         read: the operation that tells the state.
         at: where the state is in its response, whatever its status.
-        pattern: a regular expression that finds the state in that text, as its only group; empty: the text is it.
+        pattern: a regular expression that finds the state in that text, as its only group; empty if the text is it.
         operations: by "METHOD PATH" or "POST /PORT/OPERATION" of a WSDL, or by another name if they have ``send``.
         changes: what the device does by itself, by the state before it.
         within_s: time for an operation without a time of its own, s.
@@ -119,7 +119,7 @@ class StateMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return (self.read, *(one.send or name for name, one in self.operations.items()))
 
     def state_in(self, text: str) -> str:
-        """Return the state that a text names; empty: none."""
+        """Return the state that a text names; empty if there is none."""
         found = re.search(self.pattern, text) if self.pattern else None
         return found[1] or "" if found else "" if self.pattern else text
 

@@ -58,7 +58,7 @@ class Statement(msgspec.Struct, frozen=True):
 
     Attributes:
         robot: name, vendor, version.
-        claims: the claimed conformance classes; None: none were named.
+        claims: the claimed conformance classes; None if none were named.
         values: values to use in requests, by the name of a parameter or member.
         calls: what may be called.
         motion_map: how a device moves of which only its description is known, or None.
@@ -275,7 +275,7 @@ def maps_in(path: Path) -> tuple[str, ...]:
 
 
 def bridge_in(path: Path) -> RosMap | None:
-    """Return the ROS map of a statement on a rosbridge; None: it is on another device.
+    """Return the ROS map of a statement on a rosbridge; None if it is on another device.
 
     Raises:
         StatementError: the statement cannot be read, or the map is invalid.

@@ -161,7 +161,7 @@ def _certificate(where: Endpoints) -> ClientCertificate | None:
 
 
 def _credentials(where: Endpoints) -> Credentials:
-    """Return the credentials beside the bearer token; their secrets are in files.
+    """Return the credentials other than the bearer token; their secrets are in files.
 
     Raises:
         StatementError: one is malformed; the message shows no secret.

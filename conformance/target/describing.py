@@ -169,7 +169,7 @@ def described_contract(
     Args:
         source: URL or file of the description.
         overlays: URLs or files of overlays.
-        base_url: URL below which the operations are; None: as the description says.
+        base_url: URL below which the operations are; None means as the description says.
         endpoints: what the statement or the options say.
         connection: deadline, credentials and TLS.
         out: folder of the results, in which the pack is written.

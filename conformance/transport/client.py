@@ -74,9 +74,9 @@ class Connection:
         ca_file: certificate authorities to trust instead of the system's, or None.
         token: bearer token, or None; it is one of the credentials.
         credentials: what every request carries.
-        log_in: logs in, and returns the credential that this gives, the last of all; None: the run has no login.
+        log_in: logs in, and returns the credential that this gives, the last of all; None if the run has no login.
         certificate: client certificate for TLS, or None.
-        trust: the servers to which the credentials may go; None: to each that a client is made for.
+        trust: the servers to which the credentials may go; None means to each that a client is made for.
         overload: how long the run yet waits for a device that puts requests off.
         is_patient: whether each request that the device puts off is sent again.
         request_rate: maximum requests per second, or None.
@@ -182,7 +182,7 @@ class HttpClient:
     Args:
         base_url: URL of the interface; its path is prepended to the path of every request.
         connection: deadline, token, rate limit and listeners.
-        hangs: what did not respond before; None: to any client of the connection.
+        hangs: what did not respond before; None means to any client of the connection.
     """
 
     def __init__(self, base_url: str, connection: Connection, hangs: Hangs | None = None) -> None:

@@ -82,7 +82,7 @@ class HttpConnection:
         number: as above.
         place: how many requests were sent on it.
         sent_s: when the last request was begun, s on the monotonic clock.
-        first_s: when the first octet after it came; 0: none has come.
+        first_s: when the first octet after it came; 0 if none has come.
         is_open: whether it is open.
         is_idle: whether the last response is complete and another request may follow.
         last_status: status of the last response; 0 before the first.

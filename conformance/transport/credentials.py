@@ -84,7 +84,7 @@ class Credential:
         kind: where it goes.
         secret: the token, the key, the header's value, or ``user:password`` for ``basic`` and ``digest``.
         name: of the header, the query parameter or the cookie; empty for the others.
-        near: how the sent text differs from the secret, so that no robot knows it; empty: it does not.
+        near: how the sent text differs from the secret, so that no robot knows it; empty if it does not.
     """
 
     kind: Kind

@@ -51,7 +51,7 @@ class Outgoing:
     def of(
         cls, method: str, target: str, content_type: str, body: bytes, headers: tuple[tuple[str, str], ...] = ()
     ) -> Self:
-        """Return a request with a Content-Type; empty: without one."""
+        """Return a request with a Content-Type; empty means without one."""
         return cls(method, target, (*headers, *((("Content-Type", content_type),) if content_type else ())), body)
 
     @property
@@ -200,7 +200,7 @@ class Response:
 
     @cached_property
     def put_off_s(self) -> float | None:
-        """For how long an overloaded server puts the request off, s (RFC 9110 10.2.3); None: it does not.
+        """For how long an overloaded server puts the request off, s (RFC 9110 10.2.3); None if it does not.
 
         A 429 without Retry-After leaves the time open: 0.
         """
@@ -261,7 +261,7 @@ OF_GATEWAY: Final = {502: NoAnswer.BAD_GATEWAY, 503: NoAnswer.UNAVAILABLE, 504: 
 
 
 class Unanswered(NamedTuple):
-    """A request without an HTTP response. A file of traces tells it from an exchange, as a tuple is a JSON array.
+    """A request without an HTTP response. In a file of traces it is a JSON array, and so differs from an exchange.
 
     Attributes:
         request: the request.

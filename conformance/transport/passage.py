@@ -1,4 +1,4 @@
-"""Base class of recorders: of requests over connections, and of observations beside them.
+"""Base classes of recorders: of requests over connections, and of other observations.
 
 Every client calls the recorder of its connection settings, which copies of these settings share: those of concurrent
 clients, of the stop at the end, and of raw sockets. So nothing that is sent is hidden from the history.
@@ -31,9 +31,9 @@ class Passage:
         place: the request's place on it, from 1.
         attempt: 1, or 2 where the first connection had been closed by the server.
         sent_s: when sending began, s on the monotonic clock.
-        first_s: when the first octet came back; 0: none came.
+        first_s: when the first octet came back; 0 if none came.
         ended_s: when the last octet came, or was waited for no longer.
-        within_s: the deadline for a response of usual size, s after sending; 0: none was waited for.
+        within_s: the deadline for a response of usual size, s after sending; 0 if none was waited for.
         response: what came back: a response, the octets of a raw socket as they came, or None.
         problem: what happened instead of a response, in words, or empty.
         kind: the same as an enum value.
@@ -57,7 +57,7 @@ class Passage:
 
 
 class EyeState(StrEnum):
-    """Whether something that looks at a device beside the requests sees it."""
+    """Whether an observer that sends no requests sees the device."""
 
     OPENED = "opened"
     LOST = "lost"

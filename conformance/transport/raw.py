@@ -125,7 +125,7 @@ def talk(
         client: the interface to send to.
         octets: the bytes.
         timeout_s: deadline for everything, s; by default the run's. Large sizes extend it.
-        answers: stop after this number of complete responses to GET; 0: read until the connection ends.
+        answers: stop after this number of complete responses to GET; 0 means read until the connection ends.
         cuts: positions at which sending pauses.
         pause_s: length of a pause, s; it ends early when bytes are received.
 
@@ -384,7 +384,7 @@ class PartialRequest:
         method, path: as for HttpClient.send().
         sent: the part of the body to send.
         promised: Content-Length, or None for a chunked body without its last chunk.
-        head_only: number of bytes of the head to send, without a body; None: the whole head and ``sent``.
+        head_only: number of bytes of the head to send, without a body; None means the whole head and ``sent``.
         headers: further fields; Content-Type is application/json where they have none.
 
     Raises:

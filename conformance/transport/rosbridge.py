@@ -158,7 +158,7 @@ class Subscription(Stream):
         client: of the rosbridge.
         body: of the operation: op, topic and type.
         timeout_s: until it is open, s.
-        throttle_s: the least time between two messages, s; 0: each message is sent.
+        throttle_s: the least time between two messages, s; 0 if each message is sent.
     """
 
     def __init__(self, client: HttpClient, body: dict[str, Any], timeout_s: float, throttle_s: float) -> None:
@@ -176,7 +176,7 @@ class Subscription(Stream):
 
 
 def _object(octets: bytes) -> dict[str, Any]:
-    """Return the object that a message is; empty: it is none. Never raises."""
+    """Return the object that a message is; empty if it is none. Never raises."""
     try:
         found = json.loads(octets)
     except (ValueError, RecursionError):

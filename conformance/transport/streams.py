@@ -41,12 +41,12 @@ class Stream:
         kind: server-sent events or WebSocket.
         timeout_s: until it is open, s.
         wanted: whether a message is one of those that are listened for.
-        after: the id of the last event that its client has had; empty: none.
+        after: the id of the last event that its client has had; empty if there is none.
 
     Attributes:
         request: by which it was opened; for a WebSocket, the handshake.
-        last: the last message; None: none came yet.
-        last_id: the id of the last event; empty: it has none.
+        last: the last message; None if none came yet.
+        last_id: the id of the last event; empty if it has none.
         ended: whether no more comes.
 
     Raises:
@@ -91,7 +91,7 @@ class Stream:
         threading.Thread(target=self._listen, name="stream", daemon=True).start()
 
     def send(self, text: str) -> None:
-        """Send a message over a WebSocket. Never raises: the attribute `ended` tells that the stream is over."""
+        """Send a message over a WebSocket. Never raises: the attribute `ended` shows that the stream is over."""
         with suppress(Exception):
             self._send(text)
 

@@ -1,1 +1,1 @@
-"""From evidence to verdicts: of each requirement, each class and the robot."""
+"""Derive verdicts from evidence: for each requirement, each class and the robot."""

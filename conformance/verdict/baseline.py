@@ -27,7 +27,7 @@ class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         reason: why the failure is accepted.
         expires: last day on which it is accepted.
         intermittent: whether the requirement may also pass, because the failure does not occur in every run.
-        operations: the only operations of a description that may fail; empty: all.
+        operations: the only operations of a description that may fail; empty means all.
     """
 
     requirement: Text

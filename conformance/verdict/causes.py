@@ -61,7 +61,7 @@ def by_cause(
         evidence: by requirement.
         ledger: the requirements.
         claims: the classes that are judged; others have no findings.
-        scored: ids of the requirements that count; None: all.
+        scored: ids of the requirements that count; None means all.
         beside: judged classes that decide no verdict; their findings have the last numbers.
 
     Returns:

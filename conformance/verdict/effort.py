@@ -130,7 +130,7 @@ class Effort:
 
     @property
     def budget_s(self) -> float:
-        """Time that one exploration is planned to take, s: the number of cases follows from it, and no clock."""
+        """Planned time of one exploration, s: it decides the number of cases; no clock does."""
         return _BUDGETS_S.get(self.name, 10.0 * max(1.0, self.minutes))
 
     @property

@@ -57,9 +57,9 @@ class Case:
         holds: whether the device meets the requirement in this case.
         exchange: the evidence, or None.
         expected: what the requirement demands here, as a noun phrase.
-        observed: what was seen instead; empty: a description of the response.
-        cause: failures of the same cause are one finding; empty: derived from the texts.
-        subject: what was tested; empty: method and target of the request.
+        observed: what was seen instead; empty means a description of the response.
+        cause: failures of the same cause are one finding; empty means derived from the texts.
+        subject: what was tested; empty means method and target of the request.
         operations: how each operation shows it, that of the exchange first, if not only that of the request.
         requirement: its id or an alias; empty where a rule is bound to one.
         doubt: what a right device may do that looks the same, as a sentence; with it, a failed case only warns.

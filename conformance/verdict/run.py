@@ -24,8 +24,8 @@ class Selection:
     """The requirements that are judged, and whether the run ends at the first finding.
 
     Attributes:
-        ids: of the requirements; None: all.
-        played: ids whose checks are played unless they move the device; None: all.
+        ids: of the requirements; None means all.
+        played: ids whose checks are played unless they move the device; None means all.
         exit_first: whether nothing further is tested once a MUST is found to fail.
         accepted: ids whose failures the baseline accepts, so that they end no run.
     """
@@ -79,7 +79,7 @@ class Run:
         contract: the contract that the robot is judged by.
         claims: the classes that are judged.
         allow_motion: whether the robot may be moved.
-        ros: where the statement has a ROS map: "watch" the robot's graph, or "play" the robot; empty: neither.
+        ros: where the statement has a ROS map: "watch" the robot's graph, or "play" the robot; empty if neither.
         seed: seed of everything random.
         requirement_set: the frozen set that scores the robot, or None for the whole contract.
         given: inputs that the result repeats, beside the statement.
@@ -91,11 +91,11 @@ class Run:
         ended_by: what interrupted it, such as SIGHUP, if that is known.
         losses: how often the device stopped responding.
         restart_command: command that restarts a device that stopped responding, or empty.
-        wait_s: how long a device that stopped responding is waited for, s; None: as the restart command has it.
+        wait_s: how long a device that stopped responding is waited for, s; None means as the restart command has it.
         stop_s: for how long the stop of the device is tried by default, s.
         refused: how the device refused the run's credentials, so that nothing, or not all, was judged; or empty.
         unshown: why nothing of a device with a description of its own was shown, or empty.
-        stop_undelivered: why the device may still move after the run; empty: it was stopped, or was not moved.
+        stop_undelivered: why the device may still move after the run; empty if it was stopped, or was not moved.
         unreachable: why an interface was not reachable at the start.
         tally: the generated cases of all explorations, and those that time did not allow.
         limit: the time that the run may take, and what it left out.
@@ -154,7 +154,7 @@ class Run:
 
     @property
     def scored_ids(self) -> frozenset[str] | None:
-        """Return the requirements that count: those of the frozen set, some by an alias; None: all."""
+        """Return the requirements that count: those of the frozen set, some by an alias; None means all."""
         if self.requirement_set is None:
             return None
         frozen, ledger = self.requirement_set.requirements.keys(), self.contract.ledger.values()
@@ -162,7 +162,7 @@ class Run:
 
     @property
     def beside(self) -> frozenset[str]:
-        """The classes that are judged and decide no verdict: those beside a description that no claim names."""
+        """The classes that are judged without deciding the verdict, because no claim names them."""
         named = self.statement.claims or ()
         classes = self.contract.classes
         return frozenset(name for name in self.claims if classes[name].beside and name not in named)
@@ -182,7 +182,7 @@ class Run:
 
     @property
     def enough(self) -> bool:
-        """Whether so many cases were tried that a verdict can rest on them.
+        """Whether enough cases were tried for a verdict.
 
         An exploration has up to 100 cases, and at least three. A fault that every fifth value shows is missed by three
         cases more often than not (0.8 ** 3 = 0.51), and found by four. Operations that were not called support nothing.

@@ -22,7 +22,7 @@ class TimeLimit:
     """The time that a run may take.
 
     Attributes:
-        minutes: from the first request on, min; None: as long as it needs.
+        minutes: from the first request on, min; None means as long as it needs.
         shortened: operations that were not sent all requests.
         uncalled: operations that may be called, and were not; known at the end of the run.
         is_struck: whether anything was left out.

@@ -17,7 +17,7 @@ class CallError(Exception):
     Attributes:
         kind: `refused`, `resolve`, `network`, `tls`, `closed`, `timeout`, `malformed`, `status`, `redirect`,
             `fault` or `content`.
-        refused: the status by which the robot refused who sent the request; 0: it did not.
+        refused: the status by which the robot refused who sent the request; 0 if it did not.
     """
 
     def __init__(self, kind: str, message: str, refused: int = 0) -> None:

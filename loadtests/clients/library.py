@@ -59,7 +59,7 @@ class _Limited(io.RawIOBase):
 
 
 class BoundedResponse(HTTPResponse):
-    """A response of the standard library of which only so much is read, lines of headers and chunks included."""
+    """A response of the standard library that is read up to a limit, lines of headers and chunks included."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)

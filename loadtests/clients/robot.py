@@ -78,7 +78,7 @@ class Secrets:
     """Credentials of a robot's requests: the bearer token, others, and WS-Security's user.
 
     Attributes:
-        trust: the servers to which they may go; None: to those of the robot.
+        trust: the servers to which they may go; None means to those of the robot.
     """
 
     token: str | None = None

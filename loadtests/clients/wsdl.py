@@ -90,7 +90,7 @@ def with_addresses(*robots: Robot) -> tuple[tuple[Robot, ...], list[str]]:
     """Return robots with the addresses that only their WSDLs contain, and remarks on those on other servers.
 
     Raises:
-        WsdlError: a WSDL cannot be used, or a file alone would decide where the token goes.
+        WsdlError: a WSDL cannot be used, or only a file names the server that would get the token.
         CallError: a WSDL's URL does not respond.
     """
     remarks: list[str] = []

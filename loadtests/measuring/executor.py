@@ -46,7 +46,7 @@ class Member:
     Attributes:
         state: `finished`, `lost`, or `late`: joined after the schedule was distributed.
         accounted: arrivals of the current plan in its reports.
-        share: its arrivals in the plan in which it was lost; None: it was not lost, or the model is closed.
+        share: its arrivals in the plan in which it was lost; None if it was not lost, or the model is closed.
         clock: None in the master's own process.
     """
 

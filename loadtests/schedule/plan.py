@@ -131,7 +131,7 @@ class Plan:
         part: which part of the repeat this is: a comparison that is not decided goes on over the same connections.
         offset_s: when it starts, in seconds of load since the first one's start.
         least_block_s: BLOCK_S, or SHORT_BLOCK_S where the robot is known to be quick.
-        weights: how often each operation is called; empty: all equally often.
+        weights: how often each operation is called; empty means all equally often.
         scenario: users send what a scenario says, and when it says so, without gaps between blocks.
     """
 

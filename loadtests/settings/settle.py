@@ -213,7 +213,7 @@ def contradiction(options: CliOptions) -> str | None:
 
 
 def _in_stages(options: CliOptions) -> str | None:
-    """Return the fault of the stages."""
+    """Return what is wrong with the option --stages, as a sentence; None if nothing is."""
     if not options.stages:
         return None
     given = {"rate": options.rate, "users": options.users, "duration": options.duration_s}

@@ -73,7 +73,7 @@ def generator_figures(measured: Measured, cpu_share: float | None) -> GeneratorF
 
 
 def _lag_limits(service: Histogram) -> Figures:
-    """Return how large the lag may be beside the service time of blocks that started on time."""
+    """Return the greatest lag that is acceptable for the service time of blocks that started on time."""
     return {
         name: rounded(max(share * (service.figure_ms(name) or 0.0), LEAST_LAG_MS[name]))
         for name, share in MOST_LAG.items()

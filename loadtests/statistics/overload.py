@@ -26,7 +26,7 @@ class Overload(msgspec.Struct, kw_only=True):
     Attributes:
         answered_rate, offered_rate: in a second of the measured part.
         connections: how many there were.
-        busy_from_s: when all of them were taken, in seconds of load since the run's start; None: they never were.
+        busy_from_s: when all of them were taken, in seconds of load since the run's start; None if they never were.
         waited: requests that waited for a connection; waited_ms: for how long at the median.
         waiting_at_end: requests that were not answered when the measured part was over.
     """

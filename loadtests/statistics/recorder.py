@@ -176,7 +176,7 @@ class Recorder:
     ) -> None:
         """Record a successful request (moments in monotonic ns; `server` a duration, -1 when unknown).
 
-        `noticed` is when the generator saw that no connection was free for it; 0: one was free.
+        `noticed` is when the generator saw that no connection was free for it; 0 if one was free.
         """
         self._buffer.extend((segment, operation, due, start, built, received, done, server, noticed))
         if len(self._buffer) >= _BUFFERED:

@@ -19,7 +19,7 @@ _SUCCESS, _REFUSED = range(200, 300), range(400, 500)
 
 
 def rest(method: str = "", *paths: str) -> Where:
-    """Return a condition for REST requests by method (several are separated by spaces; empty: any) and path."""
+    """Return a condition for REST requests by method (several are separated by spaces; empty for any) and path."""
     methods = method.split()
 
     def where(request: Request) -> bool:
@@ -49,7 +49,7 @@ def soap(*operations: str) -> Where:
 
 
 def containing(where: Where, pattern: bytes, least: int = 1) -> Where:
-    """Return a condition for requests of ``where`` whose body has a pattern so often at least; 0: not at all."""
+    """Return a condition for requests of ``where`` whose body has a pattern so often at least; 0 if not at all."""
     compiled = re.compile(pattern)
 
     def holds(request: Request) -> bool:

@@ -57,7 +57,7 @@ class GoodDevice:
         command: returns the command that starts it on free ports. The process prints ``ready rest=URL`` or
             ``ready rest=URL soap=URL`` (an origin and a WSDL) when it is ready, and ends at SIGTERM. Raises
             NotInstalledError if something that the device needs is not installed.
-        statement: the file of its statement; None: nothing is declared.
+        statement: the file of its statement; None if nothing is declared.
         on_ros: whether it uses ROS, so that a probe can watch it.
         shows_effects: whether clients can read from the device which commands reached it.
         once: whether it is certified once, as a variant, instead of once for each seed.
@@ -94,8 +94,8 @@ class OpenPlace:
         pattern: a regular expression that matches the whole name of such a change
             (``operator:operation:place[:form]``).
         reason: why they break no clause.
-        side: "rest" or "soap"; empty: both.
-        methods: HTTP methods; empty: all.
+        side: "rest" or "soap"; empty means both.
+        methods: HTTP methods; empty means all.
     """
 
     pattern: str
@@ -121,8 +121,8 @@ class SelfTest:
     Attributes:
         devices: good devices; the first one is the default of ``--target``.
         mutants: hand-written mutants.
-        short: names of the mutants that ``--short`` judges, the slowest first; empty: the first fifteen.
-        quick: the device that starts fastest, used for generated mutants and variants; empty: the first one.
+        short: names of the mutants that ``--short`` judges, the slowest first; empty means the first fifteen.
+        quick: the device that starts fastest, used for generated mutants and variants; empty means the first one.
         device_for: the device for a variant or behind a web server, by the name of that, if not ``quick``.
         wsdls: returns the WSDLs of publishers and subscribers from the URL that a device prints as ``soap=``.
         variants: harmless changes of this pack, beside those of the suite.
@@ -162,11 +162,11 @@ class SelfTest:
         return self.device(name) if name or not self.devices else self.devices[0]
 
     def classes_of(self, operation: str) -> tuple[str, ...]:
-        """Return the pack's classes that can detect a change in an operation; empty: not declared."""
+        """Return the pack's classes that can detect a change in an operation; empty if not declared."""
         return next((found for pattern, found in self.classes.items() if re.fullmatch(pattern, operation)), ())
 
     def clause_of(self, operation: str) -> str:
-        """Return the clause of the contract that an operation keeps; empty: not declared."""
+        """Return the clause of the contract that an operation keeps; empty if not declared."""
         return next((found for pattern, found in self.clauses.items() if re.fullmatch(pattern, operation)), "")
 
 

@@ -39,11 +39,11 @@ class Job:
 
     Attributes:
         pack: folder of the contract pack.
-        statement: file of the robot's statement; None: nothing is declared.
+        statement: file of the robot's statement; None if nothing is declared.
         rest: the REST base URL; may be empty.
         publishers: URL of the publishers' WSDL; may be empty, as may ``subscribers``.
-        classes: conformance classes to claim instead of the statement's; empty: those of the statement.
-        requirements: ids of the requirements to judge; only their checks run; empty: all of the claimed classes.
+        classes: conformance classes to claim instead of the statement's; empty means those of the statement.
+        requirements: ids of the requirements to judge; only their checks run; empty means all of the claimed classes.
         effort: quick, standard or deep.
         seed: seed of everything random.
         domain_id: ROS domain of the probe, or None for no probe.

@@ -37,7 +37,7 @@ class Settings:
         examples: of each operation and phase.
         phases: comma-separated.
         limit_s: time after which a run is ended, s.
-        operations: method and path of each operation to call; empty: all.
+        operations: method and path of each operation to call; empty means all.
     """
 
     examples: int = EXAMPLES

@@ -313,7 +313,7 @@ def run_controls(
         parallel: number of devices judged in parallel.
         domain_id: first ROS domain to use.
         tell: called with each result, never twice at a time.
-        requirements: ids of the requirements to judge; empty: all.
+        requirements: ids of the requirements to judge; empty means all.
     """
     lock = threading.Lock()
     domains = list(range(domain_id, domain_id + parallel))

@@ -66,7 +66,7 @@ class Proxy:
 
     Args:
         rest: the robot's REST base URL.
-        soap: URL of one of the robot's SOAP services; empty: none.
+        soap: URL of one of the robot's SOAP services; empty if there is none.
         host: address to listen on.
         tls: context to serve TLS with, or None.
         prefix: path before every REST path, such as "/r2d2/api".

@@ -30,7 +30,7 @@ class Report:
         seed: seed of the sample of generated mutants.
         exist: how many generated mutants there are, of which the sample is.
         option: the option that asked for the sample: generated or adversary.
-        blamed: requirements that the unchanged device does not pass, with the reason; None: it is a good device.
+        blamed: requirements that the unchanged device does not pass, with the reason; None if it is a good device.
     """
 
     contract: Contract

@@ -169,7 +169,7 @@ BODIES = tuple(_with_body(name) for name in ("ackermann", "no-reverse", "holonom
 PLAIN = _independent("plain")
 BAROQUE = _independent("baroque", shows_effects=True)
 LEGACY = _independent("legacy")
-# Its velocities hold so briefly that over a slow link the next reading finds them ended.
+# This robot's hold time is so short that over a slow link a velocity has ended before the next reading.
 DEADMAN = GoodDevice(
     "deadman", _in_python("baroque", options=("--hold-s", "0.3")), _ROBOTS / "baroque" / "deadman.toml", once=True
 )

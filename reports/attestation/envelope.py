@@ -54,7 +54,7 @@ def read_envelope(path: Path, root: Path | None = None) -> bytes:
 
     Args:
         path: the file.
-        root: the folder that it must lie in, links followed; None: wherever it is.
+        root: the folder that it must lie in, links followed; None means wherever it is.
 
     Raises:
         ResultMissingError: the file does not exist.

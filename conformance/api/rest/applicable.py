@@ -69,7 +69,7 @@ def _with(call: Call, names: list[str], text: str) -> Call:
 
 
 def working_reads(api: RestInterface, *ids: str, most: int = _READS) -> list[Call]:
-    """Send each of reads(), at most so many, and return those with status 200: a robot may lack an extension.
+    """Send the requests of reads(), up to a number, and return those answered 200: a robot may lack an extension.
 
     What can be deleted is left out if there is anything else: a robot's own goal may end between two requests. If there
     is nothing at all, add a note to the requirements.

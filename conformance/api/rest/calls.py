@@ -29,7 +29,7 @@ class Call:
     Attributes:
         operation: the operation.
         inputs: its values.
-        octets: bytes that are sent in place of the body's value; None: the value is sent.
+        octets: bytes that are sent in place of the body's value; None if the value is sent.
     """
 
     operation: Operation

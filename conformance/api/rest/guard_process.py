@@ -144,7 +144,7 @@ def _stop(told: dict[str, Any], contexts: Contexts) -> None:
 
 
 def _context(files: str | None) -> SSLContext | None:
-    """Return a TLS context of the files of authorities and a client certificate; None: the device speaks no TLS."""
+    """Return a TLS context of the files of authorities and a client certificate; None if the device speaks no TLS."""
     if files is None:
         return None
     import ssl  # noqa: PLC0415 - it takes longer than everything else here

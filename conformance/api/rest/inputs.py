@@ -45,7 +45,7 @@ class Inputs:
         path, query, headers, cookies: values by the parameter's name.
         body: JSON value of the body, bytes to send as they are, or NOTHING.
         media_type: of the body; empty without one.
-        accept: value of Accept; empty: any format.
+        accept: value of Accept; empty means any format.
     """
 
     path: dict[str, Any] = field(default_factory=dict)

@@ -39,13 +39,13 @@ class RestInterface:
         slow: operations that once took more than a second to respond.
         stop_device: stops a device by its motion map, and returns why it may still move, or an empty text; None: it has
             no map, or may not be moved.
-        preparation: what keeps the device ready to move, for all that move it by its map; None: nothing has moved it.
+        preparation: what keeps the device ready to move, for all that move it by its map; None if nothing has moved it.
         values: what the survey of a described API knows for parameters and bodies, or None.
         looked: the exchanges by which the run has connected, before anything observed them.
-        server: the Server field of the first response that had one; empty: none had.
+        server: the Server field of the first response that had one; empty if none had.
         is_shut_out: whether the device has refused the suite for too many wrong credentials.
-        driven: by which values the run has named what it may have moved; None: the pack knows how it stops.
-        left: what the run has created and changed on a described device; None: nobody follows that.
+        driven: by which values the run has named what it may have moved; None if the pack knows how it stops.
+        left: what the run has created and changed on a described device; None if nobody follows that.
         is_recorded: whether the present exchange is recorded by a scenario, whose rules judge it.
     """
 

@@ -1,4 +1,4 @@
-"""Lists: which query parameters limit, filter, sort and page a list, and what a response contains of it."""
+"""Find the query parameters that limit, filter, sort and page a list, and the part of it in a response."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class Sorting:
 
     Attributes:
         member: plain name of the items' member.
-        descending: the direction; None: the value does not say it.
+        descending: the direction; None if the value does not say it.
     """
 
     member: str

@@ -32,7 +32,7 @@ def judge_refusal(
         what: what is wrong with it.
         field: name of the wrong field, where a problem can name it.
         shown: text of the wrong value, where a problem can name it.
-        malformed: whether 400 (no JSON) or 422 (JSON of a wrong shape or value) fits better; None: either.
+        malformed: whether 400 (no JSON) or 422 (JSON of a wrong shape or value) fits better; None means either.
         json: whether its body is JSON (or meant to be).
 
     Raises:

@@ -24,7 +24,7 @@ class Stranger:
 
     Args:
         api: the device's REST interface; its client has the right credentials.
-        wrong: what is sent; None: credentials that no device knows.
+        wrong: what is sent; None means credentials that no device knows.
     """
 
     def __init__(self, api: RestInterface, wrong: Credentials | None = None) -> None:

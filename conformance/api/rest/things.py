@@ -175,12 +175,12 @@ def doubt_of_deletion(delete: Operation) -> str:
 
 
 def doubt_of_write(*operations: Operation) -> str:
-    """Return why a GET may not show what was written; nothing unless a description speaks of that."""
+    """Return why a GET may not show what was written, if the description says so; else an empty text."""
     return "GET may show what is in effect" if any(_LATE.search(one.text) for one in operations) else ""
 
 
 def doubt_of_life(*operations: Operation) -> str:
-    """Return why a created thing may be gone; nothing unless a description of it speaks of such an end."""
+    """Return why a created thing may be gone, if the description says so; else an empty text."""
     texts = [text for one in operations for text in (one.text, *map(str, parts_of(one.shape or {}).items()))]
     return "the thing may have ended by itself" if any(map(_PASSES.search, texts)) else ""
 
@@ -446,7 +446,7 @@ def _is_narrowed(value: Any, now: Any) -> bool:
 
 
 def is_moved(value: Any, now: Any) -> bool:
-    """Return whether a time has its hour in another zone, or a date is the day beside it or has day for month."""
+    """Return whether a time has its hour in another zone, or a date is a day off or has day and month swapped."""
     try:
         sent, read = datetime.fromisoformat(value), datetime.fromisoformat(now)
     except (TypeError, ValueError):

@@ -71,7 +71,7 @@ def validity(
         target: path and query below the base URL, as sent.
         content_type: empty where there is none.
         body: octets.
-        headers: all header fields, to judge header and cookie parameters too; None: they are not judged.
+        headers: all header fields, to judge header and cookie parameters too; None if they are not judged.
     """
     path, _, query = target.partition("?")
     operation = matching(contract, method, path)

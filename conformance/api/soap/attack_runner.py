@@ -30,7 +30,7 @@ class AttackVerdict:
     Attributes:
         holds: whether the robot withstood it.
         expected: what the requirement asks for, as a noun phrase.
-        found: what came instead, as a noun phrase; empty: status and media type of the response.
+        found: what came instead, as a noun phrase; empty means status and media type of the response.
         cause: breaches of the same cause are one finding.
     """
 

@@ -106,5 +106,5 @@ def _problem(run: Run, service: SoapService) -> str:
 
 
 def repetitions(effort: Effort, standard: int) -> int:
-    """Return how often to repeat a request that one time would do for, to notice intermittent failures."""
+    """Return how often to repeat a request, to notice intermittent failures."""
     return max(1, round(standard * effort.factor))

@@ -45,7 +45,7 @@ class CallbackServer:
         return sum(1 for line in list(self._seen) if f"/{canary}" in line or line == "")
 
     def settle(self, since: float) -> None:
-        """Give a robot that calls back in its own time a moment for it, from a time of the monotonic clock on."""
+        """Wait until a moment after a time of the monotonic clock, because a robot may call back late."""
         time.sleep(max(0.0, since + _WAIT_S - time.monotonic()))
 
     def _listen(self) -> None:

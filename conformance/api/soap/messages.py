@@ -17,7 +17,7 @@ _MOST: Final = 1000
 
 
 def padded(document: bytes, octets: int) -> bytes:
-    """Return a document filled to so many octets with blanks before its last end tag."""
+    """Return a document of the given length in bytes, filled with blanks before its last end tag."""
     end = document.rindex(b"</")
     return document[:end] + b" " * (octets - len(document)) + document[end:]
 

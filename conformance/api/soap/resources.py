@@ -89,9 +89,9 @@ class Place:
     Attributes:
         act: the operation.
         method, template: as in OpenAPI.
-        request, response: their elements, below wrappers with one child; None: there is none.
-        key: name in the request of the value that identifies the thing; empty: none.
-        id: name of the value that identifies an item of the list in the response; empty: it is no list of things.
+        request, response: their elements, below wrappers with one child; None if there is none.
+        key: name in the request of the value that identifies the thing; empty if there is none.
+        id: name of the value that identifies an item of the list in the response; empty if it is no list of things.
     """
 
     act: Act
@@ -123,7 +123,7 @@ class Resources:
     Args:
         contract: the pack with the WSDL.
         found: what the WSDL describes.
-        branch: of each choice in a request, in rotation; None: all of them, as optional.
+        branch: of each choice in a request, in rotation; None means all of them, as optional.
     """
 
     def __init__(self, contract: Contract, found: Wsdl, branch: int | None = None) -> None:
@@ -233,7 +233,7 @@ class Resources:
         known |= there.keys()
 
     def item_of(self, seen: SoapExchange, template: str, id_: str, item: Any) -> SoapExchange:
-        """Return an item of a list as if it was read alone; None: the list lacks it."""
+        """Return an item of a list as if it was read alone; None if the list lacks it."""
         request = replace(seen.request, url=f"{BASE}{re.sub(_IN_PATH, lambda _: quote(id_, safe=''), template)}")
         found = replace(seen.response, octets=json.dumps(item).encode())
         page = page_of(seen.response)
@@ -271,7 +271,7 @@ class Resources:
         return _STATUS.sub("a fault", _REQUEST.sub(name, text))
 
     def message(self, place: Place, request: Outgoing) -> Node | None:
-        """Return the content of the message to an operation for a request to its resource; None: it has none.
+        """Return the content of the message to an operation for a request to its resource; None if it has none.
 
         Raises:
             NoElementError, ValueError: the schema has no place for a value of the request.
@@ -358,7 +358,7 @@ def _without_empty(value: Any, emptied: frozenset[str]) -> Any:
 
 
 def _thing_of(act: Act, found: Wsdl) -> dict[str, str]:
-    """Return the things that a request may name, in the singular, each with the name of the value for that."""
+    """Return the kinds of things that a request may name, in the singular, each with the name of its identifier."""
     request = _inside(found.types.shape(act.operation.request) if act.operation.request else None)
     noun, things = singular(act.noun), dict[str, str]()
     for name, one in _leaves(request):

@@ -27,8 +27,8 @@ class XmlStyle:
     """The choices of a writer.
 
     Attributes:
-        envelope_prefix: for SOAP's namespace; empty: it is the default namespace there.
-        payload_prefix: for the namespaces of the payload; empty: default namespaces.
+        envelope_prefix: for SOAP's namespace; empty if it is the default namespace there.
+        payload_prefix: for the namespaces of the payload; empty means default namespaces.
         early: whether prefixes are bound at the root rather than where they are used first.
         declaration: XML declaration.
         quote: around attribute values.

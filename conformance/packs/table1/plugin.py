@@ -78,7 +78,7 @@ class Device(device.Device):
 
     @property
     def hold_s(self) -> float | None:
-        """Time for which a velocity holds unless renewed, s; None: not declared."""
+        """Time for which a velocity holds unless renewed, s; None if not declared."""
         return said_of(self.run).limits.hold_s
 
     @cached_property

@@ -25,16 +25,16 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Where a robot may be driven.
 
     Attributes:
-        arena: (x_min, y_min, x_max, y_max) in the frame of goals, m; None: stay near where the robot is.
+        arena: (x_min, y_min, x_max, y_max) in the frame of goals, m; None means stay near where the robot is.
         frame: frame of goals and plans.
         radius_m: how far from where it is a goal may be, when there is no arena.
-        goals: poses (x, y, yaw) that can be reached; empty: found by asking for plans.
+        goals: poses (x, y, yaw) that can be reached; empty means found by asking for plans.
         odom_to_map: (x, y, yaw) of the odometry frame in the frame of goals.
         actuated: the velocity components that the robot can actuate.
         turns_on_the_spot: whether it can turn without driving; if not, ``min_radius_m`` must be declared.
         min_radius_m: radius of the narrowest circle that it can drive, m.
         wheel_separation_m: distance of the wheels whose speed linear.x limits, so that a robot drives slower while it
-            turns, m; 0: either limit can be reached whatever the other part is; None: not declared.
+            turns, m; 0 means either limit can be reached whatever the other part is; None if not declared.
     """
 
     arena: tuple[Finite, Finite, Finite, Finite] | None = None

@@ -97,7 +97,7 @@ def same_values(trace: tuple[Life, ...]) -> Iterable[Outcome]:
 
 @rule("description/list-order", on=(lifecycles,))
 def created_in_order(trace: tuple[Life, ...]) -> Iterable[Outcome]:
-    """Judge whether a list has the order of creation that its description tells."""
+    """Judge whether a list is in order of creation, as its description says."""
     yield from (replace(case, doubt=SENTENCE) for case in _looks(trace, Kind.ORDER))
 
 

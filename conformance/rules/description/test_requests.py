@@ -177,7 +177,7 @@ def _place_in(why: str) -> str:
 
 
 def _json_type(text: str) -> str:
-    """Return the type of a JSON text as far as its first character tells it."""
+    """Return the type of a JSON text by its first character."""
     return {'"': "string", "{": "object", "[": "array", "t": "boolean", "f": "boolean", "n": "null"}.get(
         text[:1], "number"
     )

@@ -229,7 +229,7 @@ def last_of_many(trace: Leg, motion: MotionMap) -> Iterator[Outcome]:
 
 
 def _judge_last(leg: Leg, goal: Command, motion: MotionMap) -> Iterator[Outcome]:
-    """Judge the target of the last of several moves; another one decides nothing if nobody says what displaces it."""
+    """Judge the target of the last of several moves. Another target proves nothing if the map has no `while_moving`."""
     last = usable(leg)[-SEVERAL:]
     others = [one for one in leg.commands if one.is_ok and last and not off(at(last, motion), one.targets, motion)]
     for outcome in judge_goal(leg, goal, motion):

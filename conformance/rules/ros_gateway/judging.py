@@ -14,7 +14,7 @@ from conformance.transport.exchange import Exchange
 
 
 def differing(exchange: Exchange, value: str, definition: Definition, body: Body, at: str, ros: RosMap) -> str:
-    """Return how a part of a response is not a ROS message; empty: it is.
+    """Return how a part of a response is not a ROS message; empty if it is.
 
     Args:
         exchange: with the response.
@@ -30,7 +30,7 @@ def differing(exchange: Exchange, value: str, definition: Definition, body: Body
 
 
 def change_text(content: dict[str, object], sent: str, body: Body) -> str:
-    """Return how what arrived is not the message that was sent; empty: it is."""
+    """Return how what arrived is not the message that was sent; empty if it is."""
     found = next(changes(fields_in(content, body), fields_in(json.loads(sent), body)), None)
     return f"{found[0]} is {found[1]} in place of {found[2]}" if found else ""
 

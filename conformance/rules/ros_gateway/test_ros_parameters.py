@@ -1,4 +1,4 @@
-"""Rules on parameters of nodes: the web shows and sets their values, and tells what a node refuses."""
+"""Rules on parameters of nodes: the gateway shows and sets their values, and reports what a node refuses."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _judge_set(put: Put) -> Iterator[Outcome]:
 
 @rule("ros-gateway/parameter-refused", on=(node_parameters,))
 def refusals(trace: Parameters) -> Iterator[Outcome]:
-    """Judge whether a value that the node refuses, or does not get, is told as a failure, and changes nothing."""
+    """Judge whether a value that the node refuses or does not receive is reported as a failure and changes nothing."""
     for got in trace.gets:
         if not got.value:
             yield _failure(got, f"{got.body.parameter} of {got.body.node}, {Reaction.MISSING}")

@@ -197,7 +197,7 @@ def _requests_in(bursts: Iterable[Burst], ros: RosMap) -> tuple[list[Request[Sen
 
 
 def _keys(heard: Iterable[Heard], wanted: list[dict[str, object]]) -> list[int | None]:
-    """Return the key of each message that came; None: no request asked for it."""
+    """Return the key of each message that came; None if no request names it."""
     contents = [each.content for each in heard]
     return [next((key for key, one in enumerate(wanted) if equal(each, one)), None) for each in contents]
 

@@ -43,7 +43,7 @@ class Binding(Protocol):
     def make(
         self, call: str, body: Any, media_type: str = JSON, root: str = "", *, authorized: bool = True
     ) -> Outgoing:
-        """Return the request of a call with this body; None: without one, or with the usual one.
+        """Return the request of a call with this body; None means without one, or with the usual one.
 
         Args:
             call: the operation.

@@ -76,7 +76,7 @@ def with_room(
 def _plan(
     mapped: MappedDevice, choices: Sequence[Mapping[str, float]], lasts_s: float
 ) -> tuple[float, dict[str, Span]]:
-    """Plan a drive; if one slow response leaves no room for it, measure how slow they are once more."""
+    """Plan a drive; if one slow response leaves no room for it, time the responses again."""
     try:
         return mapped.room.plan(choices, lasts_s)
     except NotPossibleError:

@@ -121,7 +121,7 @@ class MappedDevice:
 
     @property
     def _lasts_s(self) -> float:
-        """How long a move lasts, s; 0: as long as the way takes."""
+        """How long a move lasts, s; 0 means as long as the way takes."""
         return self.moves.seconds if "seconds" in names_in([self.moves.send, self.moves.body]) else 0.0
 
     def read(self, *, at_once: bool = False) -> Reading:
@@ -279,7 +279,7 @@ class MappedDevice:
         """Send the stop, and velocity 0 too if the device refuses the stop, or takes velocities alone.
 
         Returns:
-            The stop; None: there is none that can be sent.
+            The stop; None if there is none that can be sent.
         """
         command = self.stop()
         is_enough = self.motion.goto is not None and command is not None and not command.is_refused
@@ -440,7 +440,7 @@ class MappedDevice:
 
         Args:
             stop: whether to stop it.
-            within_s: how long to wait, s; None: as long as the map says, and at least some seconds.
+            within_s: how long to wait, s; None means as long as the map says, and at least some seconds.
 
         Raises:
             NotPossibleError: it does not.

@@ -42,7 +42,7 @@ def speed_in(readings: Sequence[Reading], name: str, motion: MotionMap) -> float
 def end_of_travel(
     readings: Sequence[Reading], name: str, wanted: float, motion: MotionMap, so_far: Sequence[Reading]
 ) -> float | None:
-    """Return where a device stands though it is driven on, if nobody declared that its travel goes any farther.
+    """Return where a driven device has stopped moving, if this may be the undeclared end of its travel.
 
     Args:
         readings: under way.

@@ -129,7 +129,7 @@ class _Way:
 
 
 def _axes(mapped: MappedDevice, effort: Effort) -> list[str]:
-    """Return the axes that are moved one by one, first the longest in tolerances: at quick effort only that one."""
+    """Return the axes that are moved one by one, the longest (in tolerances) first; at quick only that one."""
     axes, tolerance = mapped.motion.state.axes, mapped.motion.tolerance
     ranked = sorted(
         axes, key=lambda name: (axes[name].limits[0] - axes[name].limits[1]) / (tolerance(name) or math.inf)
@@ -138,7 +138,7 @@ def _axes(mapped: MappedDevice, effort: Effort) -> list[str]:
 
 
 def _way(mapped: MappedDevice, name: str, share: float = _UNDER_WAY) -> _Way:
-    """Move to the farther end of an axis, first to the other end if needed; return once a share of it is done."""
+    """Move to the farther end of an axis, first to the other end if needed; return when a share of the way is done."""
     if not mapped.rests:
         mapped.saw_rest(mapped.watch(mapped.clock.now() + STAYS_S))
     axes = mapped.motion.state.axes

@@ -48,7 +48,7 @@ class Preparation:
 
     Attributes:
         motion: what the device wants; may grow while it is found.
-        lease: its value; "held" where it has none; empty: there is no lease now.
+        lease: its value; "held" where it has none; empty if there is no lease now.
     """
 
     def __init__(self, motion: Wanted, binding: Binding, send: Callable[[Outgoing], Exchange], clock: Clock) -> None:

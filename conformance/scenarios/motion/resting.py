@@ -68,7 +68,7 @@ def creeping(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -
 
 
 def may_creep(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -> bool:
-    """Return whether all readings together show an axis that moves: too few of them to tell whether it goes on."""
+    """Return whether all readings together show an axis that moves, but are too few to show that it keeps moving."""
     return any(
         len(seen) >= 2 * SEVERAL and abs(rate(seen) or 0.0) > most(seen)
         for _, seen, rate, most in _seen_of(readings, motion, resting)
@@ -78,11 +78,11 @@ def may_creep(readings: Sequence[Reading], motion: MotionMap, resting: Resting) 
 def _seen_of(
     readings: Sequence[Reading], motion: MotionMap, resting: Resting
 ) -> Iterator[tuple[str, list[Sample], _Rate, Callable[[Sequence[Sample]], float]]]:
-    """Yield for each axis its name, its samples, and functions for the rate of some and for the most of it at rest."""
+    """Yield for each axis its name, its samples, a function for their rate, and one for the greatest rate at rest."""
     declared = motion.velocity.axes if motion.velocity else {}
 
     def noisier(noise: Noise, seen: Sequence[Sample]) -> Noise:
-        """Return the noise before any move, or that of all these samples: a few at rest may show too little of it."""
+        """Return the greater noise: before any move, or of these samples. A few samples at rest may show too little."""
         return noise._replace(sigma=max(noise.sigma, scatter(seen)))
 
     for name, noise in resting.speeds.items():
@@ -101,7 +101,7 @@ def _seen_of(
 
 
 def crept(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -> str:
-    """Return the same of the last readings, where they last long enough to tell."""
+    """Return the same as `creeping`, for the last readings, if they last long enough."""
     last = [reading for reading in readings if reading.sent >= readings[-1].sent - 1.5 * CREEPS_S]
     return creeping(last, motion, resting) if last and last[-1].sent - last[0].sent >= CREEPS_S else ""
 

@@ -117,7 +117,7 @@ class Room:
         return next((name for name, speed in several if share * abs(speed) < least[name]), "")
 
     def note(self, speeds: Speeds, readings: Sequence[Reading]) -> None:
-        """Learn from a drive how fast one velocity changes each axis; drives with several velocities do not tell."""
+        """Learn from a drive by one velocity how fast it changes each axis."""
         driven = [(name, speed) for name, speed in speeds.items() if speed]
         if len(driven) != 1:
             return
@@ -133,7 +133,7 @@ class Room:
                     self._rates[name][axis] = min(least, rate), max(greatest, rate)
 
     def ends(self, speeds: Speeds, readings: Sequence[Reading]) -> bool:
-        """Learn whether a device stands at an end of its travel that nobody declared; later drives end before it."""
+        """Learn whether a device stands at an undeclared end of its travel; later drives end before it."""
         self._so_far += readings[:: max(1, len(readings) // SEVERAL)]
         found = False
         for name, wanted in speeds.items():

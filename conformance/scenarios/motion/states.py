@@ -24,7 +24,7 @@ _SHARE = 0.4
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
 def agreement(mapped: MappedDevice) -> tuple[Told, ...]:
-    """Read by each operation that tells it the position at rest, and the velocity under way and afterwards."""
+    """Read by each operation of the map the position at rest, and the velocity during a move and after it."""
     if not mapped.motion.state.agrees:
         raise NotDeclaredError("the map names no other operation that tells the position")
     return record_parts(_read_states(mapped))

@@ -23,11 +23,11 @@ class Reading:
 
     Attributes:
         sent, received: when it was requested, and when the response had arrived.
-        values: positions by axis; empty: the response has not all of them.
-        stamp: the device's time, s; None: there is none.
+        values: positions by axis; empty if the response has not all of them.
+        stamp: the device's time, s; None if there is none.
         exchange: request and response.
         speeds: measured velocities by their names, of those that the response has.
-        action: what the last accepted move said of itself just after; empty: not read.
+        action: what the last accepted move said of itself just after; empty if not read.
     """
 
     sent: float
@@ -129,10 +129,10 @@ class Drive:
         wanted: velocities by name, as the device must take them.
         commands: in order; all of them command the same.
         under_way: the readings until the last of them.
-        end: the command of velocity zero; None: nothing was sent any more, or another velocity.
+        end: the command of velocity zero; None if nothing was sent any more, or another velocity.
         after: the readings after that.
-        refused: a command after the last one that the device must refuse; None: none was sent.
-        slowed: that it was slower than planned, as the limits leave no room; empty: it was not.
+        refused: a command after the last one that the device must refuse; None if none was sent.
+        slowed: that it was slower than planned, as the limits leave no room; empty if it was not.
         resting: what the device shows at rest.
         since: when it had reached the velocity, or else had to, s; None: the time to settle after the first response.
         rested: since when it was seen at rest, where nobody looked for longer, s; None: until after it had to rest.
@@ -184,7 +184,7 @@ class Told:
 
     Attributes:
         when: at rest, or what it drives at.
-        values: by operation; empty: it has not all of them.
+        values: by operation; empty if it has not all of them.
         exchanges: by operation.
     """
 
@@ -220,7 +220,7 @@ class Tried:
     Attributes:
         kind: beyond, invalid, unactuated, incomplete or unauthorised; a pack may have others.
         what: as a noun phrase.
-        exchange: request and response; None: the connection was closed before a response could come.
+        exchange: request and response; None if the connection was closed before a response could come.
         failed: whether the content of a 2xx says that it failed.
     """
 
@@ -240,8 +240,8 @@ class Quiet:
         readings: after each of them, and for a while after the last one.
         alone: the same, some attempts at a time up to the one that moved it, if the device moved in all of them.
         idle: the same without any attempt, after those.
-        home: the target near which it rests, by axis; empty: it takes no positions.
-        beside: what an attempt has changed beside the motion; empty: nothing.
+        home: the target near which it rests, by axis; empty if it takes no positions.
+        beside: what an attempt has changed beside the motion; empty if there is none.
     """
 
     where: dict[str, float]

@@ -58,20 +58,19 @@ _KEPT_S: Final = 0.1  # longest time between two renewals, s
 _SLOWER: Final = 0.7
 # How long a device is watched after the time to rest, s.
 _REST_S: Final = 0.5
-# How long a device that still moves a little is watched, s: a creeping one goes on.
+# How long a device that still moves slowly is watched, to see whether it comes to rest, s.
 _SLOWS_S: Final = 2.0
-# Most further readings of it.
-_MORE: Final = 50
-# Readings from which the speed is learned.
-_NOTED: Final = 50
+_MORE: Final = 50  # most readings in that time
+_NOTED: Final = 50  # readings from which the speed is learned
 
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
 def velocities(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Drive, ...]:
     """Drive each axis at its limits and slowly, there and back, and two at once; end each drive with velocity 0.
 
-    At quick each axis at its limits, and slowly two at once, or the only one back; the seed says in which of several
-    ways. At standard each way drives each axis there and back, and beside another axis that it must leave alone.
+    At quick, each axis is driven at its limits, and two slowly at once (or the only one back); the seed chooses the
+    command if the map has several. At standard, each command drives each axis there and back, also while another axis
+    moves, which must not change.
     """
     if effort.name == "quick":
         parts = [
@@ -241,9 +240,9 @@ class Part:
     Attributes:
         what: as a noun phrase.
         speeds: what is commanded.
-        ends: what the device must take instead; None: the same.
+        ends: what the device must take instead; None means the same.
         longer: whether it is to outlast the hold time.
-        by: in which ways it is commanded in turn; empty: as usual.
+        by: in which ways it is commanded in turn; empty means as usual.
         is_stopped: whether the stop ends it, in place of velocity 0.
     """
 
@@ -271,7 +270,7 @@ def _in_a_row(mapped: MappedDevice, parts: Sequence[Part]) -> Iterator[Drive]:
 
 
 def _at_each(mapped: MappedDevice, parts: Sequence[Part]) -> Iterator[tuple[Part, Drive, bool]]:
-    """Yield each part with its drive, and whether there was room for the whole of it.
+    """Yield each part with its drive, and whether there was room for the whole drive.
 
     A velocity turns into the next one while the limits leave room for both.
     """
@@ -339,8 +338,8 @@ def left_alone(
         hold_s: its hold time, s.
         more: how often the velocity is sent once more at the end, on a connection of its own.
         refused: sends what commands nothing after the last command, and returns what the device must refuse, if any;
-            None: nothing is sent.
-        gone: how the client vanishes, one of WAYS; empty: it stays, and keeps its lease.
+            None if nothing is sent.
+        gone: how the client vanishes, one of WAYS; empty if it stays, and keeps its lease.
         brief: whether to look no longer than until it rests.
         silent_s: for so long after the last command a client that vanishes sends nothing, s; None: until the device
             must rest, unless it goes on reading.
@@ -378,7 +377,7 @@ def left_alone(
 
 
 def _shows_hold(mapped: MappedDevice, drive: Drive, hold_s: float) -> bool:
-    """Return whether readings within the hold time show velocities, or come too seldom for that on any try."""
+    """Return whether readings within the hold time show velocities, or are too rare for that in every try."""
     last = drive.commands[-1]
     begin, end = last.answered + HELD[0] * hold_s, last.sent + HELD[1] * hold_s
     within = [reading for reading in drive.after if begin <= reading.sent and reading.received <= end]
@@ -453,7 +452,7 @@ def _kept_up(
         made: the velocity, with room for it.
         settle_s: time to reach it, s.
         rests_s: time to rest afterwards, s.
-        before: the drive that turns into this one; None: it begins at rest.
+        before: the drive that turns into this one; None if it begins at rest.
         outlasts_s: for so long it is commanded at least, and measured after that, s; 0: as long as it takes to see it.
         measured_s: for so long one is measured that is not steady by then, s.
     """
@@ -528,7 +527,7 @@ def _watch_rest(
         drive: until then.
         after: the readings so far.
         rests_at: when it must rest.
-        brief_from: when it may be left, s of the clock, if it rests already; None: not before it must rest.
+        brief_from: when it may be left, s of the clock, if it rests already; None means not before it must rest.
     """
     due, speeds = rests_at + mapped.room.slowest_s, drive.wanted
 

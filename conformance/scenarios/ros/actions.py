@@ -57,7 +57,7 @@ class Look:
     Attributes:
         sent, received: when.
         exchange: request and response.
-        word: what it says of its state; empty: nothing.
+        word: what it says of its state; empty if there is none.
         feedback, result: whether the response has one.
     """
 
@@ -80,9 +80,9 @@ class Goal:
         value: JSON of the goal.
         exchange: the request that sent it, and its response.
         feedback: JSON of the feedback that the server gave, in order.
-        result: JSON of the result that the server gave; empty: none.
+        result: JSON of the result that the server gave; empty if there is none.
         looks: what it said of itself.
-        cancel: the request to cancel it, and its response; None: there was none.
+        cancel: the request to cancel it, and its response; None if there was none.
         heard: what the server got and did, for this goal or for this and its other.
     """
 

@@ -32,7 +32,7 @@ class Shape:
     Attributes:
         item: the type of its items, or of itself if it is no array.
         is_array: whether it is one.
-        count: of a fixed array, how many items; None: they may be fewer or more.
+        count: of a fixed array, how many items; None if they may be fewer or more.
         most: of a bounded one, at most.
     """
 
@@ -53,7 +53,7 @@ class Shape:
 
     @property
     def longest(self) -> int | None:
-        """How many characters a string may have at most; None: any number."""
+        """How many characters a string may have at most; None means any number."""
         found = _TEXT.fullmatch(self.item)
         return int(found[1]) if found and found[1] else None
 
@@ -87,7 +87,7 @@ class Definition:
     types: Types
 
     def fields(self, name: str = "") -> Iterator[tuple[str, Shape]]:
-        """Yield the fields of a type of the definition; empty: of the root."""
+        """Yield the fields of a type of the definition; empty means of the root."""
         for field, declared in self.types[name or self.root].items():
             # C++ and Python add this field to a message without fields.
             if field != "structure_needs_at_least_one_member":

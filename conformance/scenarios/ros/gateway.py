@@ -115,7 +115,7 @@ class Gateway:
             raise NotPossibleError(self._problem) from error
 
     def _check_alone(self, robot: Robot) -> None:
-        """Hear whether anybody publishes what the suite is to publish: a gateway would be blamed for that.
+        """Listen whether another node publishes to the suite's topics: a gateway would be blamed for its messages.
 
         Raises:
             ProbeError: somebody does.
@@ -231,9 +231,9 @@ class Gateway:
     def following(
         self, exchange: Exchange, body: Acts | Calls, template: str, content: dict[str, Any]
     ) -> Outgoing | None:
-        """Return the request of an operation on a goal or a call; None: the response does not name it.
+        """Return the request of an operation on a goal or a call; None if the response does not name it.
 
-        Without an id in the template, it is about the only goal.
+        If the template has no id, the request is for the only goal.
         """
         if not (NAME.search(template) or "{id}" in str(content)):
             return self.binding.make(template, content or None)

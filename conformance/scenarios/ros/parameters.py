@@ -46,7 +46,7 @@ class Got:
     Attributes:
         operation: the operation.
         body: its map.
-        value: JSON of the parameter as a message with one field; empty: its node is not there.
+        value: JSON of the parameter as a message with one field; empty if its node is not there.
         exchange: the read that shows it, else the last one.
         was_shown: whether it shows the value.
     """
@@ -66,7 +66,7 @@ class Put:
         operation: the operation.
         body: its map.
         reaction: what the node does.
-        value: JSON of what was sent, as a message with one field; empty: it is no value of the type.
+        value: JSON of what was sent, as a message with one field; empty if it is no value of the type.
         exchange: request and response.
         heard: JSON of what the node was asked to set, each as such a message.
         before, after: JSON of what the node had.

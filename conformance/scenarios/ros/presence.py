@@ -45,7 +45,7 @@ class Absence:
         body: its map.
         when: as a noun phrase.
         exchange: the last read.
-        first: the read that was made when there was a message; None: there never was any.
+        first: the read that was made when there was a message; None if there never was any.
     """
 
     body: Reads
@@ -63,7 +63,7 @@ class Presence:
         shown: whether its message was returned in time, or a new one that is no other topic's: that the gateway
             changes messages is another matter.
         exchange: the read that shows it, else the last one.
-        instead: the topic whose message was returned; empty: none.
+        instead: the topic whose message was returned; empty if there is none.
     """
 
     publisher: str
@@ -252,7 +252,7 @@ class Listed:
         kind: its type.
         there: whether it is on the graph, and no name that the list leaves out.
         right: whether the list came to say so in time.
-        found: what the list last had as its type; empty: nothing.
+        found: what the list last had as its type; empty if there is none.
         exchange: the last read.
     """
 

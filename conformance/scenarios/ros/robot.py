@@ -85,7 +85,7 @@ class Robot(RosProcess):
         return Published(sent[0] / _NS if sent else time.monotonic(), not said["best_effort"])
 
     def take_heard(self, name: str, count: int = 0, within_s: float = 0.0) -> list[Heard]:
-        """Return what a topic, service or action received since the last call; wait for ``count`` of it.
+        """Return the messages that a topic, service or action received since the last call; wait for ``count`` of them.
 
         Raises:
             ProbeError: see tell().

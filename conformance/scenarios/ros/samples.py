@@ -91,7 +91,7 @@ class Maker:
 
         Args:
             most: how many, beside large ones and those with NaN or infinities.
-            large: how many numbers the large ones have; 0: there are none.
+            large: how many numbers the large ones have; 0 if there are none.
         """
         yield self.usual()
         yield Sample("the message with its defaults", Kind.DEFAULT, {})
@@ -201,7 +201,7 @@ class Maker:
                 yield Sample(f"a message with {value}", Kind.NON_FINITE, made)
 
     def beyond(self) -> Sample | None:
-        """Return a message with an integer that is greater than its type has; None: it has no integers."""
+        """Return a message with an integer that is greater than its type has; None if it has no integers."""
         made = self._with_one({item: most + 1 for item, (_, most) in INTEGERS.items()})
         return None if made is None else Sample("a message with an integer beyond its type", Kind.EXTREME, made)
 

@@ -85,7 +85,7 @@ class Called:
         operation: the operation.
         body: its map.
         server: what the server did.
-        request, answer: JSON of what was sent, and of what the server responded; empty: nothing.
+        request, answer: JSON of what was sent, and of what the server responded; empty if there is none.
         attempt: what the gateway responded.
         ended: when it came.
         heard: what the server got.
@@ -109,7 +109,7 @@ class Called:
 
     @property
     def is_refused(self) -> bool:
-        """Return whether the gateway took the request for a wrong one, and called nobody."""
+        """Return whether the gateway refused the request as invalid, and called no service."""
         return not self.heard and is_out_of_range(self.attempt, self.body)
 
     @property

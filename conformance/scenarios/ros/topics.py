@@ -205,7 +205,7 @@ class Sent:
         operation: the operation.
         topic: on which it publishes.
         what: the message as a noun phrase.
-        value: JSON of the message; empty: it is none.
+        value: JSON of the message; empty if it is none.
         exchange: request and response.
         accepted: whether it was answered 2xx, and not by what the map says is a failure.
         client: who sent it.
@@ -372,7 +372,7 @@ class _Writer:
                 until = min(until, clock.now() + _MORE_S)
 
     def in_bursts(self, times: int, *, many: bool) -> Iterator[Burst]:
-        """Yield messages in a row of one client, at once of several, and of many, each of which sends several."""
+        """Yield bursts of messages: one after the other by one client, and at once by several and by many clients."""
         robot, ends = self.gateway.robot, (self.body.publishes, "publishers")
         before = robot.count(*ends)
         for _ in range(times):
@@ -444,13 +444,13 @@ class _Writer:
         return shape is not None and not shape.is_text
 
     def send_invalid(self, every: Mapping[str, Outgoing], is_wrong: Collection[str]) -> Iterator[Burst]:
-        """Yield invalid requests with their outcome; one by one only if something comes, to see of which."""
+        """Send invalid requests and yield their outcome. Repeat them one by one only if any message arrived."""
         for _ in range(2):
             sent = [replace(self.send_made(what, "", made), is_wrong=what in is_wrong) for what, made in every.items()]
             if not self.gateway.robot.take_heard(self.body.publishes, 1, _MORE_S):
                 yield from (Burst(self.call, one.what, (one,), (), self.reliable) for one in sent)
                 return
-            # It may be the word of a watchdog.
+            # The message may come from a watchdog of the gateway, not from these requests.
             if not self.is_silent():
                 return
         for what, made in every.items():

@@ -1,4 +1,4 @@
-"""Scenarios beside a real robot: compare a gateway's responses with messages that the suite receives on ROS."""
+"""Scenarios with a real robot: compare a gateway's responses with messages that the suite receives on ROS."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ class Document:
     """The value in a body.
 
     Attributes:
-        value: JSON with its numbers as they are written, or the first element in a SOAP Body; None: it is neither.
+        value: JSON with its numbers as they are written, or the first element in a SOAP Body; None if it is neither.
         is_xml: whether it is XML, in which each value is a text.
     """
 
@@ -115,7 +115,7 @@ def document_of(octets: bytes) -> Document:
 
 
 def document_for(value: dict[str, Any], definition: Definition, body: Body, ros: RosMap) -> Any:
-    """Return the request document for sending a message, in the map's form or plain JSON; None: it has no body."""
+    """Return the request document for sending a message, in the map's form or plain JSON; None if it has no body."""
     message = _web(value, Shape(definition.root), definition, ros)
     if body.places:
         mapped: Any = {}
@@ -186,7 +186,7 @@ def _web(value: Any, shape: Shape, definition: Definition, ros: RosMap) -> Any:
 def differences(
     document: Document, value: dict[str, Any], definition: Definition, body: Body, ros: RosMap
 ) -> list[Difference]:
-    """Return the fields in which a web's message is not a ROS message; empty: they are the same."""
+    """Return the fields in which a web's message is not a ROS message; empty if they are the same."""
     return list(differing(document, value, definition, body, ros))
 
 

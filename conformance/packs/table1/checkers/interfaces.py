@@ -37,7 +37,7 @@ class _State:
         name: of the state.
         shape: of its value.
         over_soap, as_xml: what is broken where SOAP, or XML, shows another value.
-        differs: returns where a value differs from another one, or an empty text; None: there is no such state.
+        differs: returns where a value differs from another one, or an empty text; None if there is no such state.
         before: the value as JSON that was read last since anything may have changed it.
         since: values over SOAP and as XML since then, with their exchanges and requirements.
     """
@@ -183,7 +183,7 @@ class _Seen:
 
     Attributes:
         path, shape, full, requirement: as above.
-        listed: the entries over REST, as read last; None: not read yet.
+        listed: the entries over REST, as read last; None if not read yet.
         received_s: when they were received, s of the monotonic clock.
         others: entries over SOAP since then, the newest.
     """

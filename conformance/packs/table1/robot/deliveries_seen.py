@@ -1,4 +1,4 @@
-"""Observers of arriving deliveries: a ROS probe beside the robot, or the robot's own list."""
+"""Observe arriving deliveries: by a ROS probe on the robot's graph, or by the robot's own list."""
 
 from typing import Any, Final, Protocol
 
@@ -93,7 +93,7 @@ def _identity(entry: Any) -> tuple[Any, ...]:
 
 
 class ProbeObserver:
-    """A ROS node beside the robot.
+    """A ROS node on the robot's graph.
 
     Args:
         probe: its process.

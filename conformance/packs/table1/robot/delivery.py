@@ -46,7 +46,7 @@ class Sent:
             together (at the same moment as others).
         interface: rest or soap.
         delivery: its values.
-        exchange: request and response; None: no response came.
+        exchange: request and response; None if no response came.
     """
 
     how: str

@@ -92,7 +92,7 @@ class DeliverySender:
         )
 
     def watch(self, seconds: float) -> None:
-        """Record arriving deliveries until this many seconds after the last batch; 0: those that have arrived."""
+        """Record arriving deliveries until this many seconds after the last batch; 0 means those that have arrived."""
         left_s = self._collected + seconds - WALL_CLOCK.now()
         self.batches.append(Batch((), tuple(self.observer.collect(0, max(0.0, left_s)))))
 

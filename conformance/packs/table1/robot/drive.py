@@ -132,7 +132,7 @@ class Drive:
         return hold_s is not None and self.look_s > _LOOK_SHARE * hold_s
 
     def hold(self, velocity: Velocity) -> Callable[[], bool]:
-        """Command a velocity; return a function that tells whether it certainly still holds.
+        """Command a velocity; return a function that returns whether the velocity certainly still holds.
 
         If it has, the robot may have slowed down and sped up again between two reads.
         """

@@ -91,7 +91,7 @@ def outcome_fault(exchange: Exchange, code: int, id_: str | None = None) -> str:
     Args:
         exchange: a GET of the goal that was answered 404.
         code: the status with which the goal ended (action_msgs/GoalStatus).
-        id_: the goal's id; None: any.
+        id_: the goal's id; None means any.
     """
     problem = read_json(exchange.response.body).value
     last: Any = problem.get("last_goal") if isinstance(problem, dict) else None

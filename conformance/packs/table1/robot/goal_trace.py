@@ -43,7 +43,7 @@ class Put:
     Attributes:
         exchange: the PUT's request and response.
         body: the goal that was sent.
-        shown: the goal that the robot showed; None: it showed none.
+        shown: the goal that the robot showed; None if it showed none.
         read: the GET that showed it.
         differs: where it differs from the goal sent; empty if nowhere.
         ended: whether the robot was already at the target, so that the goal may have ended before the GET.
@@ -87,17 +87,17 @@ class GoalLife:
         repeated: repeated PUTs of the active goal.
         put_back: PUTs of the active goal as GET showed it.
         contradicted: PUTs of another pose under the active goal's id.
-        velocity: the response to a velocity PUT while a goal was active; None: no velocity was sent.
+        velocity: the response to a velocity PUT while a goal was active; None if no velocity was sent.
         drive: commands and readings of that velocity, where the robot accepted it.
-        linear: the response to a PUT of a linear velocity after it; None: none was sent.
+        linear: the response to a PUT of a linear velocity after it; None if none was sent.
         kept: velocities that were refused while a goal was active, with the goal that the robot then showed.
         second: the PUT of another goal without an id.
-        now_s: the stamp of the robot's odometry after that, s; None: it could not be read.
+        now_s: the stamp of the robot's odometry after that, s; None if it could not be read.
         took_s: the time from the PUT to that reading, s.
         reused: the PUT of another pose under the first goal's id, after that goal had been replaced.
         again: the same PUT once more, after that goal had been cancelled.
-        renamed: whether the robot accepted the second goal only with an id; None: it accepted it without one.
-        cancelled: DELETEs of the active goal; empty: the goal had ended before.
+        renamed: whether the robot accepted the second goal only with an id; None if it accepted it without one.
+        cancelled: DELETEs of the active goal; empty if the goal had ended before.
         cancels: all DELETEs that were sent while a goal was active, also where the goal had ended when they arrived.
     """
 
@@ -193,7 +193,7 @@ class FarGoal:
 
     Attributes:
         exchange: the PUT's request and response.
-        read: the last GET of the goal; None: the robot rejected it, so there was no GET.
+        read: the last GET of the goal; None if the robot rejected it, so there was no GET.
         waited_s: the time the robot had to end the goal, s.
     """
 

@@ -37,7 +37,7 @@ def motion_map_of(statement: Statement, xml_root: str = "") -> MotionMap:
 
     Args:
         statement: what its vendor says of it.
-        xml_root: the root element of its velocity as XML; empty: it takes no XML.
+        xml_root: the root element of its velocity as XML; empty if it takes no XML.
     """
     limits = statement.limits
     there = [component for component in range(len(NAMES)) if can_move(statement.motion, component)]
@@ -62,7 +62,7 @@ def motion_map_of(statement: Statement, xml_root: str = "") -> MotionMap:
 
 
 def way_of(motion: MotionMap, by: By) -> tuple[Way | None, ...]:
-    """Return in which ways of the map a velocity is commanded in turn, the last one by ``by``; empty: as usual."""
+    """Return in which ways of the map a velocity is commanded in turn, the last one by ``by``; empty means as usual."""
     ways = motion.velocity.ways if motion.velocity else ()
     found = next((way for way in ways if bool(way.root) == (by == "xml")), None)
     if by not in {"linear", "xml"} or found is None:
@@ -81,7 +81,7 @@ def velocity_of(speeds: Mapping[str, float]) -> Velocity:
 
 
 def xml_root_of(robot: Robot) -> str:
-    """Return the root element of a velocity as XML; empty: the robot at rest does not take velocity 0 as XML."""
+    """Return the root element of a velocity as XML; empty if the robot at rest does not take velocity 0 as XML."""
     exchange = put_as_xml(robot, VELOCITY, STILL.twist)
     return local_name(parse_xml(exchange.request.body)) if exchange is not None and exchange.response.ok else ""
 

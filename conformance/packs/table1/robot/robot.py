@@ -333,7 +333,7 @@ def handiest(motion: Motion) -> int:
 
 
 def _within(limits: Limits, motion: Motion, component: int, value: float) -> float:
-    """Return a component clipped to its range, or in the other direction if the robot has only that one."""
+    """Return a velocity component clipped to its range; reversed if the robot moves only the other way."""
     if not can_move(motion, component):
         return 0.0
     least, greatest = limits.range_of(component)

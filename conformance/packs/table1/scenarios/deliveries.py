@@ -231,7 +231,7 @@ class CountedDeliveries:
         last: a valid delivery after them, which must arrive.
         after: valid deliveries just after invalid ones, with their exchanges.
         keyed: those with a key, or None if no observer shows arrivals.
-        seen: the deliveries that arrived; None: no observer shows them.
+        seen: the deliveries that arrived; None if no observer shows them.
         unseen: why no observer shows them, or empty.
     """
 

@@ -189,7 +189,7 @@ def _compare(api: RestInterface, call: Call, renew: Callable[[], object]) -> lis
 
 
 def _first(api: RestInterface, changes: Iterator[Call]) -> tuple[FormatsRead, ...]:
-    """Return the differences in the first reading after each change but the first, or that there is none."""
+    """Return the differences in the first reading after each change except the first one."""
     left: Found | None = None
     for number, call in enumerate(changes):
         found, exchange = one_turn(api, call, _others(call))

@@ -359,9 +359,9 @@ class _Way:
         )
 
     def look_back(self, start: Pose, before: Command | None, body: dict[str, Any], *, turns: bool) -> None:
-        """Watch, after a goal was reached, for the velocity from before it; request a plan back; PUT the goal again.
+        """After a goal was reached, watch for the velocity from before it; request a plan back; PUT the goal again.
 
-        A robot that ``turns`` on the spot gets it with another heading.
+        If the robot ``turns`` on the spot, the goal is sent again with another heading.
         """
         trace, robot = self.trace, self.robot
         if trace.undecided or not (trace.ended or trace.other) or not trace.is_near or trace.way_m <= trace.has_to_m:

@@ -35,7 +35,7 @@ class NotAcceptable:
     Attributes:
         path: the resource.
         exchange: request and response.
-        has_effect: whether an accepted PUT had its effect; None: not accepted, or the usual PUT has no effect either.
+        has_effect: whether an accepted PUT had its effect; None if not accepted, or the usual PUT has no effect either.
     """
 
     path: str

@@ -27,7 +27,7 @@ class PlanRead:
 
     Attributes:
         exchange: the plan's request and response.
-        problem: what is wrong with the response; empty: it has a plan.
+        problem: what is wrong with the response; empty if it has a plan.
         start: where the plan begins compared with the robot; None where the request has a start or the pose is unknown.
     """
 
@@ -56,7 +56,7 @@ class DefaultPlan:
     Attributes:
         goal: where the plan must end.
         exchange: the plan's request and response.
-        problem: what is wrong with the response; empty: it has a plan.
+        problem: what is wrong with the response; empty if it has a plan.
         plan: the plan, or None.
         explicit: the plan for the same request with the defaults written out.
     """
@@ -91,9 +91,9 @@ class FramePlan:
         frame: the frame.
         begin: the robot's position in that frame.
         exchange: the plan's request and response.
-        problem: what is wrong with the response; empty: it has a plan.
+        problem: what is wrong with the response; empty if it has a plan.
         plan: the plan, or None.
-        moved_m: how far the robot moved in the meantime, m; None: the frame is unknown to the suite.
+        moved_m: how far the robot moved in the meantime, m; None if the frame is unknown to the suite.
     """
 
     frame: str

@@ -263,7 +263,7 @@ class _Player:
     def _take_arrivals(
         self, observer: DeliveryObserver, orders: list[tuple[Delivery, Exchange]], last: Exchange, left_s: float
     ) -> tuple[Delivery, ...]:
-        """Record the deliveries after the last refused request; return those that nobody ordered."""
+        """Record the deliveries after the last refused request; return those that no accepted request ordered."""
         accepted = tuple((delivery, exchange) for delivery, exchange in orders if exchange.response.ok)
         try:
             seen = tuple(sighting.delivery for sighting in observer.collect(len(accepted), left_s))

@@ -130,7 +130,7 @@ def turn(robot: Robot, mapped_robot: MappedDevice, run: Run, soap: SoapServices,
 
 @scenario(needs={Need.REST, Need.MOTION})
 def further_axes(robot: Robot, mapped_robot: MappedDevice, run: Run, soap: SoapServices) -> Driven:
-    """Drive along each axis that the robot has beside those of a robot on two wheels; without any, do nothing."""
+    """Drive along each axis that a robot on two wheels lacks, if this robot has any."""
     further = [axis for axis in range(len(STILL)) if axis not in {AHEAD, ABOUT} and robot.can_move(axis)]
     driving = _Turning(robot, mapped_robot, Drive(robot), no_commands(robot, soap, str(run.seed)))
     if further:
@@ -171,7 +171,7 @@ class _Turning:
         return replace(recorded, over_soap=tuple(self.over_soap))
 
     def read_over_soap(self, subscribers: SoapService, turn: int) -> None:
-        """Read the state over SOAP beside some looks, to compare it with the odometry at every heading."""
+        """Read the state over SOAP during some looks, to compare it with the odometry at every heading."""
         if turn % _BESIDE == 0:
             self.over_soap.append(ask(subscribers, _STATES[turn // _BESIDE % len(_STATES)]))
 

@@ -94,7 +94,7 @@ class Walk:
             before()
 
     def command(self, act: Callable[[], bool]) -> None:
-        """Make one step that commands a velocity and waits for it; the planned time decides how many there are."""
+        """Make one step: command a velocity and wait for it. The planned time decides the number of steps."""
         if not self.ended and self._commands_left == 0:
             self.ended = _ENOUGH
         self._commands_left -= not self.ended

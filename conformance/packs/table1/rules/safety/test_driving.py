@@ -62,7 +62,7 @@ def renewal(trace: Driven, run: Run) -> Iterator[Outcome]:
 
 @rule("safety/refused-keeps", on=(turn,))
 def refused_keeps_under_way(trace: Driven, run: Run) -> Iterator[Outcome]:
-    """Judge that a velocity lasts beside others that the robot refuses, unless it does not last without them either."""
+    """Judge that refused velocities do not end an accepted one, if it lasts without them."""
     motion = motion_map_of(said_of(run))
     disturbed, alone = _apart(trace)
     if not fails(judge_hold(alone[:1], motion, JUDGED)):
@@ -113,7 +113,7 @@ def _let_go(trace: Driven) -> tuple[Drive, ...]:
 
 
 def _apart(trace: Driven) -> tuple[tuple[Drive, ...], tuple[Drive, ...]]:
-    """Return the drives that were let go beside velocities that the robot refused, and the others."""
+    """Return the drives during which the robot refused further velocities, and the other drives."""
     drives = _let_go(trace)
     return tuple(drive for drive in drives if drive.refused), tuple(drive for drive in drives if not drive.refused)
 
