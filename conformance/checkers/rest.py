@@ -20,9 +20,10 @@ from conformance.checkers.lists import Lists
 from conformance.checkers.memory import Memory
 from conformance.checkers.occasion import Occasion
 from conformance.checkers.resources import Resources
+from conformance.checkers.siblings import Siblings
 from conformance.checkers.texts import Texts
 from conformance.checkers.totals import Sublists
-from conformance.checkers.untouched import Copied, Parts, Untouched
+from conformance.checkers.untouched import Parts, Untouched
 from conformance.checkers.writes import Writes
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import resource_at
@@ -49,8 +50,8 @@ class Histories:
         self._memory = Memory(contract)
         # Those that remember what a request of unknown effect may change.
         self._states = (
-            Writes(contract), Changes(contract), Untouched(contract), Answers(contract), Commands(contract), Copied(),
-            Parts(contract),
+            Writes(contract), Changes(contract), Untouched(contract), Answers(contract), Commands(contract),
+            Parts(contract), Siblings(contract),
         )  # fmt: skip
         self._checkers = (
             Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory, *self._states,

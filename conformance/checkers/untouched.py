@@ -11,15 +11,14 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Any, Final, NamedTuple
-from urllib.parse import unquote
 
 from conformance.api.rest.patches import same
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import identifier_of, is_shared, parts_of
+from conformance.api.rest.things import parts_of
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_text import clip, read_json
-from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
+from conformance.documents.openapi import SAFE, is_json, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.verdict.evidence import Case
@@ -32,10 +31,6 @@ _MOST = 1_000  # responses that are kept
 KEEPS: Final = re.compile(r"nothing (?:is )?chang|not chang|unchanged|no effect|without effect", re.IGNORECASE)
 # For a revision member _TWICE refusals are enough, if it did not change between _MANY reads without a refusal.
 _TWICE, _MANY = 2, 12
-_BODIES = 8  # bodies that are kept for each thing
-_TELLING = 5  # a value with this many characters is unlikely to appear by chance
-# Parts of a path that refer to different things at different times.
-_ALIASES: Final = frozenset({"active", "current", "default", "first", "last", "latest", "me", "newest", "next", "self"})
 # Members that change with every change of a thing.
 _REVISION: Final = re.compile(r"(?:revision|version|etag|(?:updated|modified|changed)(?:at|on|time)?)$")
 # Phrases with which a description says that no refused request changes anything.
@@ -147,62 +142,6 @@ class Untouched:
             self._waiting[path] = wrong[0], before.members.get(wrong[0]), case
         else:
             yield case
-
-
-class Copied:
-    """Judges each plain GET of a thing by what other things were sent since the one before: it must not have that."""
-
-    def __init__(self) -> None:
-        # By path: the members at the last read, and the bodies that things beside it were sent since then.
-        self._seen: dict[str, tuple[dict[str, Any], list[dict[str, Any]]]] = {}
-        self._count = Counter[str]()
-
-    def forget(self) -> None:
-        """Forget all reads: something else may have changed the things."""
-        self._seen.clear()
-
-    def __call__(self, occasion: Occasion) -> Iterator[Case]:
-        """Yield the cases of one exchange."""
-        operation, path = occasion.operation, occasion.context.target.partition("?")[0].rstrip("/")
-        if occasion.request.method in SAFE:
-            if occasion.request.method == "GET" and operation is not None and occasion.context.plain:
-                yield from self._read(occasion, operation, path)
-            return
-        if refuses(occasion.response.status, operation):
-            return
-        self._seen.pop(path, None)
-        if not (operation is not None and operation.template.rstrip("/").endswith("}")):
-            # It may act on things as it likes.
-            self._seen.clear()
-        above = path.rpartition("/")[0]
-        body = read_json(occasion.request.body).value if is_json(occasion.request.media_type) else None
-        for at, (_, sent) in self._seen.items():
-            if at.rpartition("/")[0] == above and isinstance(body, dict) and len(sent) < _BODIES:
-                sent.append(body)
-
-    def _read(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
-        answer, (before, sent) = occasion.response, self._seen.pop(path, ({}, []))
-        is_usable = answer.ok and is_json(answer.media_type) and len(answer.body) < _OCTETS and bool(operation.shape)
-        now = occasion.members(parts_of(operation.shape))
-        if not is_usable or not now or not operation.template.rstrip("/").endswith("}"):
-            return
-        name = unquote(path.rpartition("/")[2]).casefold()
-        if name in _ALIASES or identifier_of(now, operation).casefold() not in {"", name}:
-            return
-        if len(self._seen) < _MOST:
-            self._seen[path] = now, []
-        changed = {name for name in now if before and not same(now[name], before.get(name)) and not is_shared(name)}
-        taken = next((name for body in sent for name in changed & body.keys() if same(body[name], now[name])), "")
-        self._count[operation.label] += bool(taken)
-        # No device comes by itself to a text of the suite's.
-        is_sure = self._count[operation.label] >= _TWICE or "roaas" in str(now.get(taken))
-        if sent and (not taken or is_sure):
-            expected = f"the {taken or 'values'} that it had before, as only others were written"
-            is_telling = len(str(now.get(taken, ""))) >= _TELLING
-            doubt = "" if is_telling else "the things may share it, or it may have come to that by itself"
-            cause = f"{operation.label} of another"
-            found = f"{clip(now.get(taken))} as {taken}, which another thing was sent"
-            yield occasion.case("description/written-is-read", not taken, expected, found, cause=cause, doubt=doubt)
 
 
 class Parts:

@@ -38,6 +38,7 @@ from conformance.scenarios.living import ABSENT
 from conformance.scenarios.neighbours import NO_TAG, read_parts
 from conformance.scenarios.posted_files import FILES, post_files
 from conformance.scenarios.scenario import scenario
+from conformance.scenarios.siblings import write_siblings
 from conformance.scenarios.singletons import is_changeable, is_free
 from conformance.scenarios.special_bodies import by_format, is_list_of_changes, special_bodies
 from conformance.scenarios.stage import Leaves, Need, Stage
@@ -63,8 +64,6 @@ _TEXTS: Final = tuple(f"roaas {word}\n two  words\r\n\ttab\n".encode() * 200 + b
 _TURN: Final = 98
 # Members that are written singly after all together, to see whether the others stay.
 _SINGLES: Final = 4
-# Things beside it that are read, the oldest that are known.
-_OTHERS: Final = 4
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
@@ -92,28 +91,22 @@ def own_things(api: RestInterface, values: Values) -> Survey:
                 if not is_item and is_free(free[0], path):
                     kept.upload()
             if create is not None and thing_path:
-                thing, own = _Thing(surveyor, read, thing_path), thing_path.rstrip("/")
-                ids = values.known_ids(read, read.parameter("path")[-1])
-                paths = (f"{own.rpartition('/')[0]}/{quote(str(one), safe='')}" for one in ids)
-                others = [Outgoing("GET", one) for one in paths if one != own][-_OTHERS:]
+                thing = _Thing(surveyor, read, thing_path)
                 thing.try_undeclared()
                 if "206" in read.responses:
                     thing.in_parts(read, thing.target)
-                # What is written to this one must not be in another one.
-                list(map(api.send, others))
                 thing.write(changes)
-                list(map(api.send, others))
                 thing.upload()
                 thing.beside(create, delete)
                 thing.listed_below(operations, changes)
                 if values.unique.knows(create) and changes:
                     thing.made_alike(create, changes, delete)
                 thing.delete(delete, operations.get(("GET", collection_of(path))))
-                list(map(api.send, others))
     with api.run.limit.lift(), suppress(NoAnswerError):
         post_files(surveyor, operations)
         change_entries(surveyor, operations)
         send_commands(surveyor, operations)
+        write_siblings(surveyor, operations)
     return surveyor.trace
 
 
