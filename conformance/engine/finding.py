@@ -520,6 +520,10 @@ class Finder(ABC):
                     return bool(said == right)
         return True
 
+    def halt(self) -> str:
+        """Stop the device, if what it was commanded has no end of its own; return why it may still move, or nothing."""
+        return ""
+
     def _send(self, call: str, body: Any) -> Exchange:
         self._ready.keep()
         return self._exchange(self._ready.with_lease(self._binding.make(call, body)))
@@ -532,15 +536,9 @@ class Finder(ABC):
 
         As long as the device refuses each command, it gets what it may want before it moves.
         """
-        zero = {command.name: min(max(0.0, command.limits[0]), command.limits[1]) for command in self._plan.numbers}
-        written: dict[str, Any] = {**zero, **values, "seconds": self.seconds}
-        for command in self._plan.numbers:
-            if command.schema.get("type") == "integer":
-                written[command.name] = round(written[command.name])
         while True:
-            written["lease"] = self._ready.lease
             try:
-                exchange = self._send(fill(self._plan.drive.label, written), fill(self._body, written))
+                exchange = self._send(*self._call_and_body(values))
             except NoValueError as error:
                 raise NotPossibleError(str(error)) from error
             took = self._took(exchange)
@@ -548,3 +546,16 @@ class Finder(ABC):
             if took or not wants_more(exchange) or self._is_accepted or not (self._prepare() or self._waits()):
                 self._note_ready()
                 return exchange
+
+    def _call_and_body(self, values: Mapping[str, float]) -> tuple[str, Any]:
+        """Return call and body of a command.
+
+        Raises:
+            NoValueError: a value cannot be written at its place.
+        """
+        zero = {command.name: min(max(0.0, command.limits[0]), command.limits[1]) for command in self._plan.numbers}
+        written: dict[str, Any] = {**zero, **values, "seconds": self.seconds, "lease": self._ready.lease}
+        for command in self._plan.numbers:
+            if command.schema.get("type") == "integer":
+                written[command.name] = round(written[command.name])
+        return fill(self._plan.drive.label, written), fill(self._body, written)

@@ -52,6 +52,11 @@ _COORDINATES: Final = frozenset("xyz")
 class VelocityFinder(Finder):
     """Finds the map of a device that is given velocities."""
 
+    def halt(self) -> str:
+        """Command velocity 0, without renewing a lease: the process that guards the run may send it as well."""
+        exchange = self._exchange(self._ready.with_lease(self._binding.make(*self._call_and_body({}))))
+        return "" if self._took(exchange) else f"{self._plan.drive.label} with velocity 0 got {exchange.came}"
+
     def _find(self) -> None:
         try:
             responses = self._responses()

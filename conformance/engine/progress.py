@@ -52,6 +52,7 @@ class Interruption:
     def handle(self, number: int, _frame: FrameType | None) -> None:
         """Record a signal, and raise KeyboardInterrupt."""
         self._run.interrupted = True
+        self._run.signals += 1
         self._run.ended_by = self._run.ended_by or ended_by(number)
         now = time.monotonic()
         if self._is_closing or (self._raised_at is not None and now - self._raised_at < _LEAVES_S):

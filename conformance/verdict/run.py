@@ -87,6 +87,7 @@ class Run:
         digests: of what judges, as in result.json; empty until the run begins.
         judge: the evidence.
         aborted: why the run was aborted, or empty.
+        signals: how many signals that end the run came.
         interrupted: whether the run was interrupted.
         ended_by: what interrupted it, such as SIGHUP, if that is known.
         losses: how often the device stopped responding.
@@ -115,6 +116,7 @@ class Run:
     digests: dict[str, Any] = field(default_factory=dict)
     judge: Judge = field(init=False)
     aborted: str = ""
+    signals: int = 0
     interrupted: bool = False
     ended_by: str = ""
     losses: int = 0

@@ -1,5 +1,6 @@
 """However a command ends, the robot that it moved is at rest, and from the first request on there is a result."""
 
+import asyncio
 import base64
 import json
 import os
@@ -7,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -101,6 +103,71 @@ def test_a_run_that_is_ended_leaves_the_device_at_rest_and_a_result(ending, tmp_
     result = _result(out)
     assert result["interrupted"] is True
     assert ending.said in " ".join(result["notes"])
+
+
+def _found_by_driving(url: str, out: Path) -> Begun:
+    words = ("certify", f"{url}/openapi.json", "--drive", "PUT /velocity", "--read", "GET /state", "--allow-motion")
+    more = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    return Begun(*words, "--yes", "--timeout", "2", "--out", out, **more)
+
+
+@pytest.mark.parametrize("numbers", [(signal.SIGINT,), [signal.SIGINT] * 20, (signal.SIGTERM, signal.SIGHUP)], ids=str)
+def test_a_search_for_the_map_that_is_ended_leaves_the_device_at_rest_and_says_so(numbers, tmp_path):
+    device = Mover()
+    with small_device(DESCRIPTION, device.routes) as url, _found_by_driving(url, tmp_path / "out") as process:
+        assert device.await_that(_drives(1), process), process.communicate()
+        _send(*numbers)(process)
+        said = process.communicate(timeout=120)[1]
+        assert device.velocity == 0, said
+    assert (process.returncode, "Traceback" in said) == (130, False), said
+    assert "The device was stopped.\nInterrupted by SIG" in said
+    assert "no map was found, and nothing is judged" in said
+
+
+def test_a_search_for_the_map_that_is_killed_leaves_the_device_at_rest(tmp_path):
+    device = Mover()
+    with small_device(DESCRIPTION, device.routes) as url, _found_by_driving(url, tmp_path / "out") as process:
+        assert device.await_that(_drives(2), process), process.communicate()
+        process.kill()
+        assert device.await_that(lambda mover: mover.velocity == 0)
+
+
+class _Hangs(Mover):
+    """A device that drives and answers no command any more, until it is released."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.released = threading.Event()
+
+    @property
+    def routes(self):
+        drive = super().routes["/velocity"]["PUT"]
+
+        async def hang(request):
+            if self.velocity:
+                await asyncio.to_thread(self.released.wait, 60)
+            return await drive(request)
+
+        return super().routes | {"/velocity": {"PUT": hang}}
+
+
+def test_a_second_ctrl_c_ends_the_wait_for_a_device_that_hangs_and_the_guard_goes_on(tmp_path):
+    device = _Hangs()
+    with small_device(DESCRIPTION, device.routes) as url, _found_by_driving(url, tmp_path / "out") as process:
+        assert device.await_that(_drives(1), process), process.communicate()
+        process.send_signal(signal.SIGINT)
+        said = ""
+        while "The stop is tried for" not in said:
+            said += (line := process.stderr.readline())
+            assert line, said
+        process.send_signal(signal.SIGINT)
+        begun = time.monotonic()
+        said += process.communicate(timeout=120)[1]
+        assert time.monotonic() - begun < 12, "it would be tried for 20 s"
+        assert (process.returncode, "WARNING: the stop could not be delivered" in said) == (130, True), said
+        assert device.velocity != 0
+        device.released.set()
+        assert device.await_that(lambda mover: mover.velocity == 0)
 
 
 def test_a_run_ends_with_the_process_that_started_it(tmp_path):

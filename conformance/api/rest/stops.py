@@ -76,9 +76,12 @@ def stop_device(api: RestInterface, tell: Callable[[str], None] = lambda _: None
     run.stop_undelivered = f"{UNDELIVERED}: the run ended before it was seen to stop"
     until = time.monotonic() + run.tries_stop_s
     open_ = stop_once(api)
+    # A signal from here on leaves the stop to the guard process, which goes on.
+    signals = run.signals
     if open_:
-        tell(f"the device was not stopped: {'; '.join(open_.values())}. The stop is tried for {run.tries_stop_s:g} s")
-    while open_ and time.monotonic() < until:
+        why = "; ".join(open_.values())
+        tell(f"the device was not stopped: {why}. The stop is tried for {run.tries_stop_s:g} s; Ctrl-C waits no longer")
+    while open_ and time.monotonic() < until and run.signals == signals:
         time.sleep(_AGAIN_S)
         with _unheard(api.client) as refusals:
             open_ = _still_open(open_)
