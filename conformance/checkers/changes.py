@@ -6,25 +6,22 @@
 from __future__ import annotations
 
 import re
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from http import HTTPStatus
 from typing import Any, Final
 from urllib.parse import unquote
 
 from conformance.api.call_rules import words_of
-from conformance.api.rest.references import singular
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import collection_of
 from conformance.checkers.occasion import ABSENT, MOST_OCTETS, SETTLES_S, Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
+from conformance.documents.openapi import SAFE, Operation, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
-from conformance.documents.writing import text_of
 from conformance.verdict.evidence import Case
 
 _MOST_THINGS: Final = 1_000
@@ -33,31 +30,6 @@ _KEPT: Final = "description/refused-keeps"
 _LEADS: Final = re.compile(
     r"\b(?:is|are) (?:then|now|afterwards) `?([\w-]+)|\b(?:becomes?|goes (?:in)?to|turns) `?([\w-]+)", re.IGNORECASE
 )
-_REFUSED: Final = re.compile(
-    r"\b(?:409|refuse[sd]?|conflict)\b([^.;:]*?\b(?:if|when|while|unless)\b[^.;:]*)", re.IGNORECASE
-)
-# The same with the condition first, as in "While the belt is archived, it is refused with 409".
-_WHILE: Final = re.compile(
-    r"\b((?:if|when|while|as long as)\b[^.;:]*),[^.,;:]*\b(?:409|refuse[sd]?|conflict)\b", re.IGNORECASE
-)
-# What cannot be done to a thing in some state, as in "A job that has finished cannot be cancelled".
-_CANNOT: Final = re.compile(r"([^.;:]*?)\b(?:cannot|can not|can no longer|must not|may not) be\b", re.IGNORECASE)
-# The only state in which an operation is accepted, as in "only a queued mission can be started" or "not queued".
-_ONLY: Final = re.compile(
-    r"(?:\bonly (?:an? |the |for |if |when |while |it is |allowed |possible )*|^not )`?([\w-]+)(?!.*(?:,| or ))",
-    re.IGNORECASE,
-)
-# Words before a condition.
-_NEEDS: Final = re.compile(
-    r"\b(?:only|unless|must|ha(?:s|ve) to|needs?|until|before|requires?|should|can|may)\b", re.IGNORECASE
-)
-_ENDED: Final = re.compile(r"\b(?:final|terminal|finished|ended|over)\b", re.IGNORECASE)
-_AND_WHILE: Final = re.compile(r",?\s+(?:and|or)\s+(?:if|when|while|as long as)\s+", re.IGNORECASE)
-#: Phrases in a description which say that an operation is refused the second time.
-ONCE: Final = re.compile(r"\b(?:second time|twice)\b[^.;]*\b(?:409|refuse[sd]?|conflict)\b", re.IGNORECASE)
-# The subject of such a condition, and its predicate; words beside a state in that.
-_IS: Final = re.compile(r"\b(unless )?(?<!of )(it|the [\w-]+) (?:is|are) (not |no longer )?([^.;:]*)", re.IGNORECASE)
-_BESIDE: Final = re.compile(r"\b(?:already|still|currently|also|yet|now|been)\b|[`()]", re.IGNORECASE)
 _STATES: Final = frozenset({"state", "status", "phase"})
 _CANCELLED: Final = frozenset({"cancelled", "canceled", "aborted"})
 #: States in which an activity has come to its own end.
@@ -122,7 +94,7 @@ class Changes:
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
-        reads = _reads(operations)
+        reads = reads_of(operations)
         self._states = {
             template: name for template, one in reads.items() if collection_of(template) and (name := state_of(one))
         }
@@ -133,7 +105,7 @@ class Changes:
             if (said := _final(reads[template], name, operations))
         }
         # By operation: states that only one thing at a time may be in. Below: accepted operations since the last read.
-        things = {name: _states_of(reads[name], member) for name, member in self._states.items()}
+        things = {name: states_of(reads[name], member) for name, member in self._states.items()}
         self._alone = {
             operation.label: found
             for operation in operations
@@ -214,7 +186,7 @@ class Changes:
         """Judge the response to an operation on a thing: a finished thing cannot be ended again."""
         before = self._known.pop(path, None)
         self._ending |= {path} if words_of(operation.template) & ENDING else set()
-        now = _state_in(occasion, name) if state_of(operation) == name else ""
+        now = state_in(occasion, name) if state_of(operation) == name else ""
         was = before.value if before is not None and not before.told else ""
         template = operation.template.rstrip("/").rpartition("/")[0]
         if now and before is not None and before.value in self._said_final.get(template, ()):
@@ -258,7 +230,7 @@ class Changes:
             self._there[path] = ""
         template = operation.template.rstrip("/")
         yield from self._judge_growth(occasion, template, path)
-        if template in self._states and (state := _state_in(occasion, self._states[template])):
+        if template in self._states and (state := state_in(occasion, self._states[template])):
             yield from self._state(occasion, operation, path, state)
 
     def _state(self, occasion: Occasion, operation: Operation, path: str, now: str) -> Iterator[Case]:
@@ -355,7 +327,7 @@ def _ends_in(occasion: Occasion) -> dict[str, Any]:
     return {name: one for name, one in found.items() if _END.fullmatch(plain_name(name))}
 
 
-def _reads(operations: Iterable[Operation]) -> dict[str, Operation]:
+def reads_of(operations: Iterable[Operation]) -> dict[str, Operation]:
     """Return the GET operations whose response has a schema, by path template."""
     return {one.template.rstrip("/"): one for one in operations if one.method == "GET" and one.shape}
 
@@ -390,10 +362,11 @@ def _alone_states(operation: Operation, states: tuple[str, ...]) -> frozenset[st
     said = another_of(operation)
     if "409" not in operation.responses or _SHARING.search(said.partition(",")[0]):
         return frozenset()
-    return frozenset(state for state in states if _word(state).search(said))
+    return frozenset(state for state in states if word_of(state).search(said))
 
 
-def _states_of(read: Operation, name: str) -> tuple[str, ...]:
+def states_of(read: Operation, name: str) -> tuple[str, ...]:
+    """Return the values of a member by the schema of a read."""
     return tuple(map(str, flat(flat(read.shape or {}).get("properties", {}).get(name, {})).get("enum", ())))
 
 
@@ -401,7 +374,7 @@ def leads_to(operation: Operation, read: Operation, name: str) -> str:
     """Return the one state to which an operation leads by its description, as in "The job is then paused"."""
     sentences = [text for text in re.split(r"[.;:]\s", operation.text) if not _UNLESS.search(text)]
     said = {word for text in sentences for found in _LEADS.finditer(text) for word in found.groups() if word}
-    found = [state for state in _states_of(read, name) if state in said]
+    found = [state for state in states_of(read, name) if state in said]
     return found[0] if len(found) == 1 else ""
 
 
@@ -434,164 +407,12 @@ def _final(read: Operation, name: str, operations: Iterable[Operation]) -> froze
     return frozenset(str(item) for item in given.get("enum", ()) if str(item).casefold() in words)
 
 
-def _state_in(occasion: Occasion, name: str) -> str:
+def state_in(occasion: Occasion, name: str) -> str:
+    """Return the state that a response shows in a member; empty if it has none."""
     found = occasion.members([name]).get(name) if len(occasion.response.body) <= MOST_OCTETS else None
     return found if isinstance(found, str) else ""
 
 
-_STATE_NAMES: Final = frozenset({"state", "status", "phase", "mode"})
-# Phrases in a description on what an operation does in every other state.
-_ELSE: Final = re.compile(r"\b(?:an)?other state|\botherwise\b", re.IGNORECASE)
-# A phrase for the state to which an operation leads, as in "queued becomes running".
-_BECOMES: Final = re.compile(r"\b(?:becomes?|goes (?:in)?to) `?[\w-]+", re.IGNORECASE)
-_NEGATED: Final = re.compile(r"\b(?:not|never|unless|except|cannot|no)\b", re.IGNORECASE)
-# How often a state change must follow an operation, because once may be by chance.
-_TWICE: Final = 2
-
-
-class Transitions:
-    """Judges operations in states in which they are refused by the description, by the read before them."""
-
-    def __init__(self, contract: Contract) -> None:
-        operations = operations_of(contract) if contract.openapi_path else ()
-        self._reads = {path: read for path, read in _reads(operations).items() if collection_of(path)}
-        # By operation: the things on whose state it depends, by path template, and what each forbids.
-        self._barred = {
-            operation.label: found
-            for operation in operations
-            if operation.method not in SAFE and "409" in operation.responses
-            if (
-                found := {
-                    path: barred_by(operation, one) for path, one in self._reads.items() if _is_at(operation, path)
-                }
-            )
-        }
-        # Operations on a thing that are refused the second time; below, paths of those that were accepted.
-        self._once = {one.label for one in operations if one.parameter("path") and ONCE.search(one.text)}
-        self._done: set[str] = set()
-        # By path: members of the thing at the last read.
-        self._seen: dict[str, dict[str, Any]] = {}
-        self._taken: Counter[tuple[str, str]] = Counter()
-
-    def __call__(self, occasion: Occasion) -> Iterator[Case]:
-        """Yield the cases of one exchange."""
-        operation, status = occasion.operation, occasion.response.status
-        path = occasion.context.target.partition("?")[0].rstrip("/")
-        if occasion.request.method in SAFE:
-            if occasion.request.method == "GET" and operation is not None:
-                self._read(occasion, operation.template.rstrip("/"), path)
-            return
-        if operation is not None and occasion.context.usual:
-            if operation.label in self._once and path in self._done:
-                expected, cause = "a refusal, as it was done before", f"{operation.label} twice"
-                yield occasion.case("description/states", not occasion.response.ok, expected, cause=cause)
-            for template, barred in self._barred.get(operation.label, {}).items():
-                yield from self._act(occasion, operation, barred, "/".join(path.split("/")[: template.count("/") + 1]))
-        if not refuses(status, operation):
-            self._seen.clear()
-            is_once = operation is not None and operation.label in self._once
-            self._done = {*self._done, path} if is_once else set()
-            above, template = path.rpartition("/")[0], operation.template.rpartition("/")[0] if operation else ""
-            read = self._reads.get(template)
-            # A device may reach other states later than it tells them.
-            if operation is not None and read is not None and status == HTTPStatus.OK and operation.shape == read.shape:
-                name = state_member(read)
-                told = _state_in(occasion, name) if name else ""
-                self._seen |= {above: {name: told}} if told.casefold() in FINAL else {}
-
-    def _act(
-        self, occasion: Occasion, operation: Operation, barred: dict[str, frozenset[str]], path: str
-    ) -> Iterator[Case]:
-        """Judge an operation by the state that the thing had; one that changes by itself may have changed meanwhile."""
-        for name, states in barred.items():
-            value = self._seen.get(path, {}).get(name)
-            state = text_of(value) if isinstance(value, str | bool) else ""
-            if state:
-                is_taken = occasion.response.ok and state in states
-                self._taken[operation.label, state] += is_taken
-                is_sure = isinstance(value, bool) or state in FINAL or self._taken[operation.label, state] >= _TWICE
-                if not is_taken or is_sure:
-                    expected = f"a refusal with 409, as the description says where {name} is {state}"
-                    found, cause = f"status {occasion.response.status}", f"{operation.label} {name} {state}"
-                    yield occasion.case("description/states", not is_taken, expected, found, cause=cause)
-
-    def _read(self, occasion: Occasion, template: str, path: str) -> None:
-        """Record the members of a thing as read."""
-        answer, read = occasion.response, self._reads.get(template)
-        is_usable = read is not None and answer.ok and is_json(answer.media_type) and len(answer.body) <= MOST_OCTETS
-        shape = flat(read.shape or {}).get("properties", {}) if read is not None else {}
-        now = occasion.members(shape) if is_usable else {}
-        self._seen.pop(path, None)
-        if now and len(self._seen) < _MOST_THINGS:
-            self._seen[path] = now
-
-
-def _is_at(operation: Operation, path: str) -> bool:
-    """Return whether an operation acts on a thing with this path template, or on something below it."""
-    return f"{operation.template}/".startswith(f"{path}/")
-
-
-def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]]:
-    """Return the values of a thing's members with which an operation is refused by its description, by member.
-
-    That says "409 if the job is running", "409 unless it is queued", or "in another state it is answered 409".
-    """
-    parts, name = flat(read.shape or {}).get("properties", {}), state_member(read)
-    # By member: its values, with the word for each in a text.
-    known = {word: {"true": word, "false": ""} for word, one in parts.items() if kinds_of(one) == {"boolean"}}
-    known |= {name: {state: state for state in _states_of(read, name)}} if name else {}
-    thing, found = singular(collection_of(read.template).rpartition("/")[2]), defaultdict[str, set[str]](set)
-    is_own = operation.template.count("{") == read.template.count("{")
-    conditions = [found[1] for said in (_REFUSED, _WHILE) for found in said.finditer(operation.text)]
-    # The description of a 409 is a condition itself, if it does not say what is needed.
-    conditions += [text for text in re.split(r"[.;:]\s", operation.conflict) if not _NEEDS.search(text)]
-    only = {one.lower() for one in _ONLY.findall(operation.conflict)} & known[name].keys() if name and is_own else set()
-    for said in (clause for condition in conditions for clause in _AND_WHILE.split(condition)):
-        for unless, subject, no, rest in _IS.findall(said):
-            for member, values in known.items() if subject.lower() in {f"the {thing}", *(["it"] * is_own)} else ():
-                if named := _values_in(rest, values):
-                    found[member] |= set(values) - named if bool(unless) != bool(no) else named
-    for said in _CANNOT.finditer(operation.text) if name and is_own and "409" in operation.responses else ():
-        if not _NEGATED.search(said[1]):
-            named = {state for state in known[name] if _word(state).search(said[1])}
-            found[name] |= named or (FINAL & known[name].keys() if _ENDED.search(said[1]) else set())
-    starts = _states_named(operation, set(known[name])) if name and operation.method == "POST" and is_own else set()
-    if (starts | only) and not found[name]:
-        found[name] = set(known[name]) - starts - only
-    return {member: frozenset(values) for member, values in found.items() if values}
-
-
-def _values_in(predicate: str, words: dict[str, str]) -> set[str]:
-    """Return the values that begin a predicate, as in "running or paused, or has items"; none if it has "and"."""
-    found = set[str]()
-    for part in re.split(r"\s*,\s*(?:or\s+)?|\s+or\s+", predicate.strip()):
-        text = _BESIDE.sub("", part).strip()
-        value = next((value for value, word in words.items() if word and _word(word).fullmatch(text)), "")
-        if not value:
-            return set() if part.startswith("and ") else found
-        found.add(value)
-    return found
-
-
-def _states_named(operation: Operation, states: set[str]) -> set[str]:
-    """Return the states that an operation starts from, by the description; none where they may mean something else."""
-    sentences = re.split(r"(?<=[.;])\s+", operation.text)
-    said = [_BECOMES.sub("", sentence) for sentence in sentences if not _ELSE.search(sentence)]
-    named = {state: [item for item in said if _word(state).search(item)] for state in states}
-    is_open = any(_NEGATED.search(item) or "409" in item for found in named.values() for item in found)
-    is_said = any(_ELSE.search(sentence) and "409" in sentence for sentence in sentences)
-    return {state for state, found in named.items() if found} if is_said and not is_open else set()
-
-
-def state_member(read: Operation) -> str:
-    """Return the member that contains a thing's state; empty if there is none."""
-    parts = flat(read.shape or {}).get("properties", {}) if collection_of(read.template) else {}
-    named = (
-        name for name, one in parts.items() if plain_name(name) in _STATE_NAMES and len(flat(one).get("enum", ())) > 1
-    )
-    # A mode is the state of what has no other one.
-    return min(named, key=lambda name: plain_name(name) == "mode", default="")
-
-
-def _word(state: str) -> re.Pattern[str]:
+def word_of(state: str) -> re.Pattern[str]:
+    """Return a pattern that finds a state in a text, its words apart in any way."""
     return re.compile(rf"\b{'[ _-]'.join(map(re.escape, re.split('[ _-]', state)))}\b", re.IGNORECASE)

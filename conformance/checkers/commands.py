@@ -17,8 +17,9 @@ from conformance.api.rest.listing import listing_of
 from conformance.api.rest.patches import same
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import id_member, object_in, parts_of
-from conformance.checkers.changes import DONE, state_member
+from conformance.checkers.changes import DONE
 from conformance.checkers.occasion import SETTLES_S, Occasion
+from conformance.checkers.transitions import state_member
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.json_text import clip, read_json

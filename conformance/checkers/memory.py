@@ -33,7 +33,9 @@ from conformance.api.rest.things import (
     is_shared,
     parts_for,
     parts_of,
+    says_absent_again,
     says_exactly,
+    says_gone,
 )
 from conformance.checkers.occasion import ABSENT, MOST_OCTETS, SETTLES_S, Occasion
 from conformance.checkers.writes import DEFAULTED
@@ -86,6 +88,7 @@ class _Thing:
         own: whether this run has created what it deleted.
         ends: kinds of things that end with it, by what the description of its DELETE says.
         doubt: why it may be read although it was deleted; empty if it may not.
+        is_gone_said: whether the description says that nothing is left of it, so that it may not be marked instead.
         made: whether this run created it, and no read has shown it yet.
         body: hash of that of the POST that created it; 0 if there was none.
         replaced: whether an equal one was created later, which may be there in its place.
@@ -103,6 +106,7 @@ class _Thing:
     own: bool = False
     ends: frozenset[str] = frozenset()
     doubt: str = ""
+    is_gone_said: bool = False
     made: bool = False
     body: int = 0
     replaced: bool = False
@@ -237,7 +241,7 @@ class Memory:
         thing = _Thing.of(path, occasion.exchange, made=status == HTTPStatus.CREATED)
         if occasion.request.method == "DELETE":
             thing.gone, thing.own, thing.ends = True, path in self._made, ending_with(operation)
-            thing.doubt = doubt_of_deletion(operation)
+            thing.doubt, thing.is_gone_said = doubt_of_deletion(operation), says_gone(operation)
             yield from self._again(occasion, operation, before)
             self._things |= {text.casefold(): replace(thing, path=text, own=True) for text in below}
         if status == HTTPStatus.CREATED:
@@ -266,7 +270,8 @@ class Memory:
         """Judge a DELETE of what is gone already, if it is declared how that is answered."""
         if before is not None and before.gone and before.absent and {"404", "410"} & delete.responses.keys():
             expected = f"a status that says that nothing is there, as a GET after {before.change} did"
-            found, doubt = f"status {occasion.response.status}", "a DELETE may be repeated (RFC 9110 9.2.2)"
+            found = f"status {occasion.response.status}"
+            doubt = "" if says_absent_again(delete) else "a DELETE may be repeated (RFC 9110 9.2.2)"
             yield self._case(_GONE, occasion, expected, found, cause=f"{delete.label} again", doubt=doubt)
 
     def _ending(self, delete: Operation, path: str) -> list[str]:
@@ -414,7 +419,8 @@ class Memory:
         """Judge a read of a deleted thing."""
         response = occasion.response
         thing.absent |= response.status in ABSENT
-        if response.ok and age_s > SETTLES_S and not is_marked_deleted(read_json(response.body).value):
+        is_there = thing.is_gone_said or not is_marked_deleted(read_json(response.body).value)
+        if response.ok and age_s > SETTLES_S and is_there:
             expected = f"status 404 or 410, {age_s:.0f} s after {thing.change} was answered {thing.status}"
             case = self._case(_GONE, occasion, expected, cause=item.label, doubt=thing.doubt)
             # A thing that always exists is emptied by DELETE, or reset.
@@ -443,7 +449,7 @@ class Memory:
         for value in items_of(read_json(occasion.response.body).value) or ():
             thing = gone.get(f"{path}/{identifier_of(value, item)}".casefold()) if isinstance(value, dict) else None
             age_s = occasion.sent_s - thing.changed_s if thing is not None else 0.0
-            if thing is not None and age_s > SETTLES_S and not is_marked_deleted(value):
+            if thing is not None and age_s > SETTLES_S and (thing.is_gone_said or not is_marked_deleted(value)):
                 expected = f"a list without what {thing.change} has deleted {age_s:.0f} s before, which no GET finds"
                 cause = f"{operation.label} listed"
                 yield self._case(_GONE, occasion, expected, "a list with it", cause=cause)

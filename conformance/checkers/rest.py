@@ -9,7 +9,7 @@ from conformance.api.rest.request_context import RequestContext
 from conformance.api.rest.things import doubt_of_write
 from conformance.checkers import declared, fields, problem, texts
 from conformance.checkers.answers import Answers
-from conformance.checkers.changes import Changes, Transitions
+from conformance.checkers.changes import Changes
 from conformance.checkers.codings import Codings
 from conformance.checkers.commands import Commands
 from conformance.checkers.contents import Contents
@@ -23,6 +23,7 @@ from conformance.checkers.resources import Resources
 from conformance.checkers.siblings import Siblings
 from conformance.checkers.texts import Texts
 from conformance.checkers.totals import Sublists
+from conformance.checkers.transitions import Transitions
 from conformance.checkers.untouched import Parts, Untouched
 from conformance.checkers.writes import Writes
 from conformance.contract.pack import Contract

@@ -79,6 +79,7 @@ class Operation:
         created: whether it updates a thing that another operation creates (x-roaas-created).
         text: what its summary and its description say.
         conflict: what the description of its status 409 says.
+        success: what the descriptions of its statuses 2xx say.
         guessed: what a read without a declared content may show, by what is written there; nothing is judged by it.
     """
 
@@ -100,6 +101,7 @@ class Operation:
     created: bool = False
     text: str = ""
     conflict: str = ""
+    success: str = ""
     guessed: Schema | None = None
 
     @cached_property
@@ -289,6 +291,11 @@ def _operation(
         created=bool(given.get("x-roaas-created", False)),
         text=" ".join(one for key in ("summary", "description") if isinstance(one := given.get(key), str)),
         conflict=str(given.get("responses", {}).get("409", {}).get("description", "")),
+        success=" ".join(
+            str(one.get("description", ""))
+            for status, one in given.get("responses", {}).items()
+            if str(status).startswith("2") and isinstance(one, dict)
+        ),
     )
 
 

@@ -14,9 +14,10 @@ from conformance.api.rest.inputs import Inputs, request_of, usual_inputs, with_n
 from conformance.api.rest.listing import items_of
 from conformance.api.rest.things import collection_of, creator_of, identifier_of, object_in, parts_of
 from conformance.api.rest.variations import Kind, Variation
-from conformance.checkers.changes import ENDING, barred_by
+from conformance.checkers.changes import ENDING
 from conformance.checkers.commands import LIVE, Command, commands_of
 from conformance.checkers.occasion import SETTLES_S
+from conformance.checkers.transitions import barred_by
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name

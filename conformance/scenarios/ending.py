@@ -21,7 +21,8 @@ from conformance.api.rest.references import singular, thing_of
 from conformance.api.rest.samples import fits
 from conformance.api.rest.things import collection_of, creator_of, id_member, object_in
 from conformance.api.rest.values import Values
-from conformance.checkers.changes import ENDING, FINAL, another_of, leads_to, state_member, state_of
+from conformance.checkers.changes import ENDING, FINAL, another_of, leads_to, state_of
+from conformance.checkers.transitions import state_member
 from conformance.checkers.untouched import KEEPS, OFTEN
 from conformance.documents.json_schema import is_number, kinds_of
 from conformance.documents.json_text import read_json

@@ -27,7 +27,7 @@ from conformance.api.rest.things import (
     path_chosen,
 )
 from conformance.api.rest.values import Values
-from conformance.checkers.changes import ONCE, barred_by
+from conformance.checkers.transitions import ONCE, barred_by
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name

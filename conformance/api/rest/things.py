@@ -48,6 +48,11 @@ _REMOVES: Final = re.compile(r"\b(?:delet|remov|eras|destroy|discard|purg|unregi
 _HIDES: Final = re.compile(
     r"\b(?:cancel|abort|archiv|deactivat|disabl|retir|soft|restor|undelet|revok|marke?[ds]? as)", re.IGNORECASE
 )
+# _IS_GONE: nothing is left after a DELETE. _AGAIN: what is deleted again is answered 404.
+_IS_GONE: Final = re.compile(
+    r"\b(?:is|are) gone\b|\bread\w*\b[^.;]*\b(?:404|410)\b|\bno list (?:has|shows|names)\b", re.IGNORECASE
+)
+_AGAIN: Final = re.compile(r"\bdelet\w*\b[^.;]*\b(?:again|twice|second time)\b[^.;]*\b(?:404|410)\b", re.IGNORECASE)
 # Phrases in a description: a write has no effect yet or GET shows the effect; a device converts a value to store it.
 _LATE: Final = re.compile(
     r"\bdraft|\bpublish|\bstaged?\b|\bcandidate\b|takes? effect|\bin(?:to)? (?:force|effect)\b|\bmeasured?\b|\bactual"
@@ -165,6 +170,16 @@ def is_marked_deleted(value: Any) -> bool:
         or (name in _ALIVE and one is False)
         for name, one in pairs
     )
+
+
+def says_gone(delete: Operation) -> bool:
+    """Return whether a description says that nothing is left to be read after a DELETE."""
+    return bool(_IS_GONE.search(f"{delete.text} {delete.success}"))
+
+
+def says_absent_again(delete: Operation) -> bool:
+    """Return whether a description says how a second DELETE is refused."""
+    return bool(_AGAIN.search(f"{delete.text} {delete.success}"))
 
 
 def doubt_of_deletion(delete: Operation) -> str:

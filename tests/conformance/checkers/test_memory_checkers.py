@@ -20,6 +20,7 @@ _BODY = {"required": True, "content": {"application/json": {"schema": _JOB}}}
 _ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
 _ONCE = {**_ID, "schema": {"type": "string", "description": "Never given twice."}}
 _OK = {"200": answers(_JOB), "201": answers(_JOB), "204": {"description": "done"}, "4XX": {"description": "refused"}}
+_FOR_GOOD = {"204": {"description": "It is gone: reading or deleting it again is 404."}, "404": {"description": "none"}}
 _PATHS = {
     "/jobs": {
         "post": {"requestBody": _BODY, "responses": _OK},
@@ -64,7 +65,7 @@ _PATHS = {
     "/jobs/{id}/cancel": {"parameters": [_ID], "post": {"responses": {**_OK, "409": {"description": "ended"}}}},
     "/jobs/{id}/retry": {"parameters": [_ID], "post": {"responses": {**_OK, "409": {"description": "not ended"}}}},
     "/keys": {"post": {"requestBody": _BODY, "responses": _OK}},
-    "/keys/{id}": {"parameters": [_UUID], "get": {"responses": _OK}, "delete": {"responses": _OK}},
+    "/keys/{id}": {"parameters": [_UUID], "get": {"responses": _OK}, "delete": {"responses": _FOR_GOOD}},
     "/notes/{id}": {
         "parameters": [_ID],
         "get": {"summary": "Read a note; its `rank` never falls.", "responses": _OK},
@@ -194,6 +195,9 @@ BROKEN = {
     ),
     "a label outlives its job": ([_post("1"), _LABEL, _delete("1"), 4.0, _below("GET")], GONE),
     "a tag is deleted twice": ([_NO_TAG, ("GET", "/tags/1", None, 404, None), _NO_TAG], GONE),
+    "a key is marked, which has to be gone by the description": (
+        [_key(_U1), _KEY_GONE, 5.0, ("GET", f"/keys/{_U1}", None, 200, {"id": _U1, "active": False})], GONE,
+    ),
     "an identifier is given twice": ([_tag(), ("DELETE", "/tags/1", None, 204, None), _tag()], THERE),
     "deleted where another one is gone": ([_delete("2"), _get("2", 404), _delete("1"), 5.0, _get("1")], GONE),
     "deleted where another one goes": ([_delete("1"), 5.0, _get("1"), _delete("2"), _get("2", 404)], GONE),
@@ -439,6 +443,13 @@ def test_what_is_published_later_is_a_doubt(contract):
         again, shown = ("PUT", path, {"rank": 3}, 204, None), ("GET", path, None, 200, {"id": "1", "rank": 3})
         steps = [(0, put), (5, read), (6, read), (9, again), (20, shown)]
         assert _doubts(contract, READ, steps) == doubts
+
+
+def test_deleted_twice_is_no_doubt_where_the_description_says_how_that_is_answered(contract):
+    for made, path, doubts in ((_tag(), "/tags/1", {True}), (_key(_U1), f"/keys/{_U1}", {False})):
+        delete = ("DELETE", path, None, 204, None)
+        steps = [(0, made), (1, delete), (2, ("GET", path, None, 404, None)), (3, delete)]
+        assert _doubts(contract, GONE, steps) == doubts
 
 
 def test_a_lost_thing_is_a_doubt_until_an_older_one_is_still_there(contract):

@@ -4,7 +4,7 @@ import pytest
 from exchanges import broken, exchange
 from small_device import REFUSED, answers, contract_of, described
 
-from conformance.checkers.changes import barred_by, state_member
+from conformance.checkers.transitions import barred_by, state_member
 from conformance.documents.openapi import read_operations
 
 _BASE = "http://device:8000"
@@ -35,6 +35,9 @@ _SAID = {
     "drop": "A belt is cancelled at once and stays cancelled. One that is done stays running, done or not.",
     "seal": "Seal the belt once. The second time is refused with 409.",
     "restore": "409 if it is not archived. If it was paused, it is then paused.",
+    "wake": "A paused belt becomes running. In every other status: 409.",
+    "rest": "A running or stopped belt becomes paused.",
+    "scrap": "Take it out. A done belt: 409.",
 }
 
 
@@ -102,6 +105,12 @@ _BROKEN = {
         [("GET 1 200", "cancelled"), ("POST 2/goods 200",), ("POST . 200",), ("GET 1 200", "done")],
         _STATES,
     ),
+    "woken from stopped": ([("GET . 200", "stopped"), ("POST /wake 200", "running")] * 2, _STATES),
+    "woken into what another operation starts from": (
+        [("GET . 200", "paused"), ("POST /wake 200", "stopped")] * 2,
+        _STATES,
+    ),
+    "scrapped when done": ([("GET . 200", "done"), ("POST /scrap 200", "scrapped")], _STATES),
     "sealed twice": ([("POST /seal 200",), ("GET . 200", "stopped"), ("POST /seal 200",)], _STATES),
     "a refused start counts": (_refused("start", 1, 2, 3), _KEEPS),
 }
@@ -118,6 +127,10 @@ _RIGHT = {
     "paused from stopped, which no word forbids": [("GET . 200", "stopped"), ("POST /pause 200", "paused")] * 2,
     "halted from running, beside a state that is denied": [("GET . 200", "running"), ("POST /halt 200", "stopped")] * 2,
     "sealed again after another change": [("POST /seal 200",), ("POST /grease 200",), ("POST /seal 200",)],
+    "woken, and at its end already": [("GET . 200", "paused"), ("POST /wake 200", "done")],
+    "woken, and answered before": [("GET . 200", "paused"), ("POST /wake 200", "paused")] * 2,
+    "laid to rest, and out of order": [("GET . 200", "running"), ("POST /rest 200", "scrapped")] * 2,
+    "scrapped when stopped": [("GET . 200", "stopped"), ("POST /scrap 200", "scrapped")],
     "resumed from paused": [("GET . 200", "paused"), ("POST /resume 200", "running")] * 2,
     "a count that goes on by itself from then on": [*_refused("start", 1, 2, 3)[:-1], ("GET . 200", "running", 5)],
     "a count that goes on by itself": [
@@ -152,6 +165,7 @@ def test_what_it_leaves_open_is_not(contract, name):
         ("Only possible while it is queued", {"active", "done"}),
         ("Not queued", {"active", "done"}),
         ("The mission is not queued", {"active", "done"}),
+        ("The mission is not queued any more. Nothing is changed.", {"active", "done"}),
         ("It is done or active already.", {"active", "done"}),
         ("Only queued or active missions can be started", set()),
         ("The mission must be queued", set()),

@@ -6,7 +6,7 @@ from small_device import certified
 from soap_devices import SOAP_11, serving
 
 from conformance.api.soap.resources import Resources
-from conformance.checkers.changes import barred_by
+from conformance.checkers.transitions import barred_by
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.documents.wsdl import read_services

@@ -1,0 +1,253 @@
+"""States in which operations on a thing are refused by their descriptions, and what a run sees of that."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from http import HTTPStatus
+from typing import Any, Final, NamedTuple
+
+from conformance.api.rest.references import singular
+from conformance.api.rest.statuses import refuses
+from conformance.api.rest.things import collection_of
+from conformance.checkers.changes import FINAL, reads_of, state_in, states_of, word_of
+from conformance.checkers.occasion import MOST_OCTETS, Occasion
+from conformance.contract.pack import Contract
+from conformance.documents.json_schema import kinds_of
+from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
+from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
+from conformance.documents.writing import text_of
+from conformance.verdict.evidence import Case
+
+_MOST_THINGS: Final = 1_000
+_REFUSED: Final = re.compile(
+    r"\b(?:409|refuse[sd]?|conflict)\b([^.;:]*?\b(?:if|when|while|unless)\b[^.;:]*)", re.IGNORECASE
+)
+# The same with the condition first, as in "While the belt is archived, it is refused with 409".
+_WHILE: Final = re.compile(
+    r"\b((?:if|when|while|as long as)\b[^.;:]*),[^.,;:]*\b(?:409|refuse[sd]?|conflict)\b", re.IGNORECASE
+)
+# What cannot be done to a thing in some state: "A job that has finished cannot be cancelled", "A cancelled job: 409".
+_CANNOT: Final = re.compile(
+    r"([^.;:]*?)\b(?:cannot|can not|can no longer|must not|may not) be\b|\b(an? [\w -]+): 409(?=[.;]|$)", re.IGNORECASE
+)
+# The only state in which an operation is accepted, as in "only a queued mission can be started" or "not queued".
+_ONLY: Final = re.compile(
+    r"(?:\bonly (?:an? |the |for |if |when |while |it is |allowed |possible )*|^not )`?([\w-]+)(?!.*(?:,| or ))",
+    re.IGNORECASE,
+)
+# Words before a condition.
+_NEEDS: Final = re.compile(
+    r"\b(?:only|unless|must|ha(?:s|ve) to|needs?|until|before|requires?|should|can|may)\b", re.IGNORECASE
+)
+_ENDED: Final = re.compile(r"\b(?:final|terminal|finished|ended|over)\b", re.IGNORECASE)
+_AND_WHILE: Final = re.compile(r",?\s+(?:and|or)\s+(?:if|when|while|as long as)\s+", re.IGNORECASE)
+#: Phrases in a description which say that an operation is refused the second time.
+ONCE: Final = re.compile(r"\b(?:second time|twice)\b[^.;]*\b(?:409|refuse[sd]?|conflict)\b", re.IGNORECASE)
+# The subject of such a condition, and its predicate; words beside a state in that.
+_IS: Final = re.compile(r"\b(unless )?(?<!of )(it|the [\w-]+) (?:is|are) (not |no longer )?([^.;:]*)", re.IGNORECASE)
+_BESIDE: Final = re.compile(
+    r"\b(?:already|still|currently|also|yet|now|been|any ?more|any longer)\b|[`()]", re.IGNORECASE
+)
+_STATE_NAMES: Final = frozenset({"state", "status", "phase", "mode"})
+# Phrases in a description on what an operation does in every other state.
+_ELSE: Final = re.compile(r"\b(?:an)?other (?:state|status|phase|mode)|\botherwise\b", re.IGNORECASE)
+# A phrase for the state to which an operation leads, as in "queued becomes running".
+_BECOMES: Final = re.compile(r"\b(?:becomes?|goes (?:in)?to) `?[\w-]+", re.IGNORECASE)
+_NEGATED: Final = re.compile(r"\b(?:not|never|unless|except|cannot|no)\b", re.IGNORECASE)
+# The states from which an operation leads, and the one to which, as in "planned or paused becomes cancelled".
+_TURNS: Final = re.compile(r"([^.;:]*?)\bbecomes? `?([\w-]+)", re.IGNORECASE)
+# How often a state change must follow an operation, because once may be by chance.
+_TWICE: Final = 2
+
+
+class _Turn(NamedTuple):
+    """The member with a thing's state, the states from which an operation leads to another one, and that one."""
+
+    name: str
+    start: frozenset[str]
+    to: str
+
+
+class Transitions:
+    """Judges operations by the state that a read before them showed: whether they are refused, and where they lead."""
+
+    def __init__(self, contract: Contract) -> None:
+        operations = operations_of(contract) if contract.openapi_path else ()
+        self._reads = {path: read for path, read in reads_of(operations).items() if collection_of(path)}
+        # By operation: the things on whose state it depends, by path template, and what each forbids.
+        self._barred = {
+            operation.label: found
+            for operation in operations
+            if operation.method not in SAFE and "409" in operation.responses
+            if (
+                found := {
+                    path: barred_by(operation, one) for path, one in self._reads.items() if _is_at(operation, path)
+                }
+            )
+        }
+        # By operation: where it leads by its description; by path template: the states from which operations lead.
+        self._turns = {
+            operation.label: turn
+            for operation in operations
+            if operation.method == "POST"
+            if (read := self._reads.get(operation.template.rpartition("/")[0])) and (turn := turn_of(operation, read))
+        }
+        self._starts: dict[str, frozenset[str]] = defaultdict(frozenset)
+        for operation in operations:
+            if turn := self._turns.get(operation.label):
+                self._starts[operation.template.rpartition("/")[0]] |= turn.start
+        # Operations on a thing that are refused the second time; below, paths of those that were accepted.
+        self._once = {one.label for one in operations if one.parameter("path") and ONCE.search(one.text)}
+        self._done: set[str] = set()
+        # By path: members of the thing at the last read.
+        self._seen: dict[str, dict[str, Any]] = {}
+        self._taken: Counter[tuple[str, str]] = Counter()
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        operation, status = occasion.operation, occasion.response.status
+        path = occasion.context.target.partition("?")[0].rstrip("/")
+        if occasion.request.method in SAFE:
+            if occasion.request.method == "GET" and operation is not None:
+                self._read(occasion, operation.template.rstrip("/"), path)
+            return
+        if operation is not None and occasion.context.usual:
+            if operation.label in self._once and path in self._done:
+                expected, cause = "a refusal, as it was done before", f"{operation.label} twice"
+                yield occasion.case("description/states", not occasion.response.ok, expected, cause=cause)
+            yield from self._turn(occasion, operation, path.rpartition("/")[0])
+            for template, barred in self._barred.get(operation.label, {}).items():
+                yield from self._act(occasion, operation, barred, "/".join(path.split("/")[: template.count("/") + 1]))
+        if not refuses(status, operation):
+            self._seen.clear()
+            is_once = operation is not None and operation.label in self._once
+            self._done = {*self._done, path} if is_once else set()
+            above, template = path.rpartition("/")[0], operation.template.rpartition("/")[0] if operation else ""
+            read = self._reads.get(template)
+            # A device may reach other states later than it tells them.
+            if operation is not None and read is not None and status == HTTPStatus.OK and operation.shape == read.shape:
+                name = state_member(read)
+                told = state_in(occasion, name) if name else ""
+                self._seen |= {above: {name: told}} if told.casefold() in FINAL else {}
+
+    def _turn(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
+        """Judge the state that the response to an operation shows, where other operations begin in it.
+
+        In any other state, a device may be on its way, or beyond the state to which the operation leads.
+        """
+        turn = self._turns.get(operation.label)
+        if turn is None or occasion.response.status != HTTPStatus.OK:
+            return
+        before, now = self._seen.get(path, {}).get(turn.name), state_in(occasion, turn.name)
+        if before in turn.start and now not in {"", before}:
+            is_other = now != turn.to and now in self._starts[operation.template.rpartition("/")[0]]
+            self._taken[operation.label, f"to {now}"] += is_other
+            if not is_other or self._taken[operation.label, f"to {now}"] >= _TWICE:
+                expected = f"{turn.to} as {turn.name}, which {before} becomes by the description"
+                found, cause = f"{now} as {turn.name}", f"{operation.label} {turn.name} becomes"
+                yield occasion.case("description/states", not is_other, expected, found, cause=cause)
+
+    def _act(
+        self, occasion: Occasion, operation: Operation, barred: dict[str, frozenset[str]], path: str
+    ) -> Iterator[Case]:
+        """Judge an operation by the state that the thing had; one that changes by itself may have changed meanwhile."""
+        for name, states in barred.items():
+            value = self._seen.get(path, {}).get(name)
+            state = text_of(value) if isinstance(value, str | bool) else ""
+            if state:
+                is_taken = occasion.response.ok and state in states
+                self._taken[operation.label, state] += is_taken
+                is_sure = isinstance(value, bool) or state in FINAL or self._taken[operation.label, state] >= _TWICE
+                if not is_taken or is_sure:
+                    expected = f"a refusal with 409, as the description says where {name} is {state}"
+                    found, cause = f"status {occasion.response.status}", f"{operation.label} {name} {state}"
+                    yield occasion.case("description/states", not is_taken, expected, found, cause=cause)
+
+    def _read(self, occasion: Occasion, template: str, path: str) -> None:
+        """Record the members of a thing as read."""
+        answer, read = occasion.response, self._reads.get(template)
+        is_usable = read is not None and answer.ok and is_json(answer.media_type) and len(answer.body) <= MOST_OCTETS
+        shape = flat(read.shape or {}).get("properties", {}) if read is not None else {}
+        now = occasion.members(shape) if is_usable else {}
+        self._seen.pop(path, None)
+        if now and len(self._seen) < _MOST_THINGS:
+            self._seen[path] = now
+
+
+def _is_at(operation: Operation, path: str) -> bool:
+    """Return whether an operation acts on a thing with this path template, or on something below it."""
+    return f"{operation.template}/".startswith(f"{path}/")
+
+
+def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]]:
+    """Return the values of a thing's members with which an operation is refused by its description, by member.
+
+    That says "409 if the job is running", "409 unless it is queued", or "in another state it is answered 409".
+    """
+    parts, name = flat(read.shape or {}).get("properties", {}), state_member(read)
+    # By member: its values, with the word for each in a text.
+    known = {word: {"true": word, "false": ""} for word, one in parts.items() if kinds_of(one) == {"boolean"}}
+    known |= {name: {state: state for state in states_of(read, name)}} if name else {}
+    thing, found = singular(collection_of(read.template).rpartition("/")[2]), defaultdict[str, set[str]](set)
+    is_own = operation.template.count("{") == read.template.count("{")
+    conditions = [found[1] for said in (_REFUSED, _WHILE) for found in said.finditer(operation.text)]
+    # The description of a 409 is a condition itself, if it does not say what is needed.
+    conditions += [text for text in re.split(r"[.;:]\s", operation.conflict) if not _NEEDS.search(text)]
+    only = {one.lower() for one in _ONLY.findall(operation.conflict)} & known[name].keys() if name and is_own else set()
+    for said in (clause for condition in conditions for clause in _AND_WHILE.split(condition)):
+        for unless, subject, no, rest in _IS.findall(said):
+            for member, values in known.items() if subject.lower() in {f"the {thing}", *(["it"] * is_own)} else ():
+                if named := _values_in(rest, values):
+                    found[member] |= set(values) - named if bool(unless) != bool(no) else named
+    for said in _CANNOT.finditer(operation.text) if name and is_own and "409" in operation.responses else ():
+        if not _NEGATED.search(text := said[1] or said[2]):
+            named = {state for state in known[name] if word_of(state).search(text)}
+            found[name] |= named or (FINAL & known[name].keys() if _ENDED.search(text) else set())
+    starts = _states_named(operation, set(known[name])) if name and operation.method == "POST" and is_own else set()
+    if (starts | only) and not found[name]:
+        found[name] = set(known[name]) - starts - only
+    return {member: frozenset(values) for member, values in found.items() if values}
+
+
+def turn_of(operation: Operation, read: Operation) -> _Turn | None:
+    """Return where an operation leads by its description; None if that names no state, or several."""
+    name = state_member(read)
+    states = states_of(read, name) if name else ()
+    said = [one for one in _TURNS.findall(operation.text) if one[1] in states and not _NEGATED.search(one[0])]
+    start = frozenset(state for state in states if len(said) == 1 and word_of(state).search(said[0][0]))
+    return _Turn(name, start, said[0][1]) if start else None
+
+
+def _values_in(predicate: str, words: dict[str, str]) -> set[str]:
+    """Return the values that begin a predicate, as in "running or paused, or has items"; none if it has "and"."""
+    found = set[str]()
+    for part in re.split(r"\s*,\s*(?:or\s+)?|\s+or\s+", predicate.strip()):
+        text = _BESIDE.sub("", part).strip()
+        value = next((value for value, word in words.items() if word and word_of(word).fullmatch(text)), "")
+        if not value:
+            return set() if part.startswith("and ") else found
+        found.add(value)
+    return found
+
+
+def _states_named(operation: Operation, states: set[str]) -> set[str]:
+    """Return the states that an operation starts from, by the description; none where they may mean something else."""
+    sentences = re.split(r"(?<=[.;])\s+", operation.text)
+    said = [_BECOMES.sub("", sentence) for sentence in sentences if not _ELSE.search(sentence)]
+    named = {state: [item for item in said if word_of(state).search(item)] for state in states}
+    is_open = any(_NEGATED.search(item) or "409" in item for found in named.values() for item in found)
+    is_said = any(_ELSE.search(sentence) and "409" in sentence for sentence in sentences)
+    return {state for state, found in named.items() if found} if is_said and not is_open else set()
+
+
+def state_member(read: Operation) -> str:
+    """Return the member that contains a thing's state; empty if there is none."""
+    parts = flat(read.shape or {}).get("properties", {}) if collection_of(read.template) else {}
+    named = (
+        name for name, one in parts.items() if plain_name(name) in _STATE_NAMES and len(flat(one).get("enum", ())) > 1
+    )
+    # A mode is the state of what has no other one.
+    return min(named, key=lambda name: plain_name(name) == "mode", default="")
