@@ -59,6 +59,8 @@ _BECOMES: Final = re.compile(r"\b(?:becomes?|goes (?:in)?to) `?[\w-]+", re.IGNOR
 _NEGATED: Final = re.compile(r"\b(?:not|never|unless|except|cannot|no)\b", re.IGNORECASE)
 # The states from which an operation leads, and the one to which, as in "planned or paused becomes cancelled".
 _TURNS: Final = re.compile(r"([^.;:]*?)\bbecomes? `?([\w-]+)", re.IGNORECASE)
+# States that a thing leaves by an operation alone.
+_RESTING: Final = frozenset({"paused", "suspended", "draft", "archived"})
 # How often a state change must follow an operation, because once may be by chance.
 _TWICE: Final = 2
 
@@ -160,7 +162,8 @@ class Transitions:
             if state:
                 is_taken = occasion.response.ok and state in states
                 self._taken[operation.label, state] += is_taken
-                is_sure = isinstance(value, bool) or state in FINAL or self._taken[operation.label, state] >= _TWICE
+                is_sure = isinstance(value, bool) or state in FINAL or state.casefold() in _RESTING
+                is_sure |= self._taken[operation.label, state] >= _TWICE
                 if not is_taken or is_sure:
                     expected = f"a refusal with 409, as the description says where {name} is {state}"
                     found, cause = f"status {occasion.response.status}", f"{operation.label} {name} {state}"

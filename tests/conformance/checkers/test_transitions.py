@@ -105,6 +105,7 @@ _BROKEN = {
         [("GET 1 200", "cancelled"), ("POST 2/goods 200",), ("POST . 200",), ("GET 1 200", "done")],
         _STATES,
     ),
+    "started from paused": ([("GET . 200", "paused"), ("POST /start 200", "running")], _STATES),
     "woken from stopped": ([("GET . 200", "stopped"), ("POST /wake 200", "running")] * 2, _STATES),
     "woken into what another operation starts from": (
         [("GET . 200", "paused"), ("POST /wake 200", "stopped")] * 2,
