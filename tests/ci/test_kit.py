@@ -8,6 +8,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 import socket
 import subprocess
 import sys
@@ -182,6 +183,36 @@ def test_a_robot_that_is_absent_or_hangs_or_could_not_be_judged_is_red(programs,
     for promised in (*artifacts["paths"], *artifacts["reports"].values()):
         assert (folders["absent"] / promised.replace("$ROAAS_OUT", TEMPLATE["variables"]["ROAAS_OUT"])).exists()
     assert artifacts["when"] == "always"
+
+
+def _bare_image(folder):
+    """Return the environment of an image without the suite, whose ``pip`` makes the command that it is to install."""
+    for name in ("bash", "sh", "cp"):
+        (folder / name).symlink_to(shutil.which(name))
+    # It stands for `python -m pip install`, and keeps what it is told to install.
+    texts = {"python": f'echo "$@" > installed\ncp {folder}/wheel {folder}/roaas-ci\n', "wheel": "echo > ran\n"}
+    for name, text in texts.items():
+        (folder / name).write_text(f"#!/bin/sh\n{text}", encoding="utf-8")
+        (folder / name).chmod(0o755)
+    return {**TEMPLATE["variables"], "PATH": str(folder)}
+
+
+@pytest.mark.parametrize(
+    "suite",
+    ["", "./roaas-0.1.0-py3-none-any.whl[soap]", "roaas[soap] @ git+https://gitlab.example/GROUP/roaas.git@v0.1.0"],
+)
+def test_gitlabs_job_installs_what_is_named_and_says_what_to_name(suite, tmp_path):
+    image, project = tmp_path / "bin", tmp_path / "project"
+    image.mkdir()
+    project.mkdir()
+    environment = {**_bare_image(image), **({"ROAAS_SUITE": suite} if suite else {})}
+    done = bash("\n".join(TEMPLATE["roaas"]["script"]), environment, project)
+    if not suite:
+        assert (done.returncode, "set ROAAS_SUITE to a wheel" in done.stderr) == (2, True), done.stderr
+        assert not (image / "roaas-ci").exists(), "nothing is installed from a registry that has no release"
+        return
+    assert (done.returncode, (project / "ran").exists()) == (0, True), done.stderr
+    assert (project / "installed").read_text(encoding="utf-8") == f"-m pip install --quiet {suite}\n"
 
 
 def test_wrong_usage_is_red_and_no_old_result_is_taken_for_new(programs, absent, tmp_path):
