@@ -12,7 +12,7 @@ from conformance.contract.generic import LEDGER
 from conformance.contract.locating import GENERIC_RULES
 from conformance.contract.pack import Contract
 
-_TABLE = re.compile(r'^\s*\[\s*"?([\w-]+)"?\s*\.\s*"?([\w-]+)"?\s*\]', re.MULTILINE)
+_TABLE = re.compile(r'\s*\[\s*"?([\w-]+)"?\s*\.\s*"?([\w-]+)"?\s*\]')
 _CLAIMS = re.compile(r"^\s*\[\s*claims\s*\]", re.MULTILINE)
 _NEXT_TABLE = re.compile(r"^\s*\[[\w\s\"'.-]+\]\s*(?:#.*)?$", re.MULTILINE)
 # A key of a mapping at the beginning of a line, in JSON or YAML.
@@ -66,7 +66,8 @@ def _ledger(path: Path, contract: Contract) -> dict[str, Any]:
 
 
 def _ledger_lines(text: str) -> dict[str, int]:
-    return {f"{found[1]}/{found[2]}": _line(text, found.start(1)) for found in _TABLE.finditer(text)}
+    lines = enumerate(text.split("\n"), 1)
+    return {f"{found[1]}/{found[2]}": number for number, line in lines if (found := _TABLE.match(line))}
 
 
 def _claim_lines(text: str) -> dict[str, Any]:

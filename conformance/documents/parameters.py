@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final
 
 from conformance.documents.json_schema import Schema, modern
 
 _NO_LETTER: Final = re.compile(r"[^a-z0-9]")
+# Longer names are not remembered: a response may have any number of them.
+_SHORT: Final = 64
 
 
 @dataclass(frozen=True)
@@ -109,4 +112,9 @@ def examples_of(given: dict[str, Any]) -> tuple[Any, ...]:
 
 def plain_name(name: str) -> str:
     """Return a normalised name, without case and separators: ``job_id`` and ``jobId`` are equal."""
+    return _plain(name) if len(name) <= _SHORT else _plain.__wrapped__(name)
+
+
+@lru_cache(maxsize=1024)
+def _plain(name: str) -> str:
     return _NO_LETTER.sub("", name.lower())

@@ -362,26 +362,9 @@ _WIDEST: Final = 2**31 - 1  # greatest integer to send where the type has no bou
 _LONGEST: Final = 1_000_000  # longest text, characters
 # Texts that are no number in XML Schema, although some programming languages accept them.
 NO_NUMBERS: Final = (
-    "four",
-    "",
-    "1,5",
-    "0x10",
-    "1e",
-    "--1",
-    "+-1",
-    "1 2",
-    "1_000",
-    "\u0664",
-    "4d",
-    "4f",
-    "1e5.5",
-    ".",
-    "infinity",
-    "true",
-    "4;",
-    "\u22124",
-    "1\u00a0000",
-)
+    "four", "", "1,5", "0x10", "1e", "--1", "+-1", "1 2", "1_000", "\u0664", "4d", "4f", "1e5.5", ".", "infinity",
+    "true", "4;", "\u22124", "1\u00a0000",
+)  # fmt: skip
 # Spellings of NaN and infinity that Python, Java or C accept but XML Schema does not (3.2.5.1 is case-sensitive).
 NO_FLOATS: Final = (*NO_NUMBERS, "Infinity", "inf", "nan", "-Infinity", "+INF", "NAN", "1.#INF")
 NO_INTEGERS: Final = (*NO_NUMBERS, "4.0", "4.", "4e0", "INF", "NaN", "3.9")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from typing import Any, Final
 from urllib.parse import parse_qsl, urlsplit
 
@@ -24,31 +25,11 @@ _WHOLE: Final = frozenset({"ref", "slug", "key", "after", "before", "since", "ne
 _TEXTS: Final = frozenset({"note", "comment", "description", "message", "remark", "text"})
 # Words that end like a reference and are none.
 _NO_REFERENCES: Final = frozenset(
-    [
-        "acid",
-        "android",
-        "avoid",
-        "bid",
-        "centroid",
-        "cuboid",
-        "ellipsoid",
-        "fluid",
-        "grid",
-        "humid",
-        "hybrid",
-        "invalid",
-        "lid",
-        "liquid",
-        "paid",
-        "pyramid",
-        "rapid",
-        "solenoid",
-        "solid",
-        "transparent",
-        "valid",
-        "void",
-    ]
-)
+    {
+        "acid", "android", "avoid", "bid", "centroid", "cuboid", "ellipsoid", "fluid", "grid", "humid", "hybrid",
+        "invalid", "lid", "liquid", "paid", "pyramid", "rapid", "solenoid", "solid", "transparent", "valid", "void",
+    }
+)  # fmt: skip
 # Text formats that JSON Schema and OpenAPI define: the suite can make a valid value.
 _DEFINED: Final = frozenset(
     {
@@ -85,6 +66,7 @@ def singular(name: str) -> str:
     return plain[:-1] if plain.endswith("s") and not plain.endswith("ss") else plain
 
 
+@lru_cache(maxsize=1024)
 def thing_of(name: str) -> str:
     """Return the normalised name of the thing that a reference names: ``valve`` for ``valve_id``; empty for ``id``."""
     plain = plain_name(name)
@@ -102,12 +84,18 @@ def refers(name: str, schema: Schema, collections: frozenset[str]) -> bool:
     given = flat(schema)
     if not kinds & {"string", "integer", "array"} or "enum" in given or "const" in given:
         return False
+    items = flat(given["items"]) if isinstance(given.get("items"), dict) else given
+    own = "format" in items and "string" in kinds_of(items) and is_free_text(items)
+    return own or _is_reference(name, collections)
+
+
+@lru_cache(maxsize=1024)
+def _is_reference(name: str, collections: frozenset[str]) -> bool:
+    """Return whether a name is that of a reference."""
     plain = plain_name(name)
     last = (_WORD.findall(name) or [""])[-1].lower()
     ends = last.endswith(_ENDS) and last not in _NO_REFERENCES
-    items = flat(given["items"]) if isinstance(given.get("items"), dict) else given
-    own = "format" in items and "string" in kinds_of(items) and is_free_text(items)
-    return ends or own or plain in _WHOLE or (thing_of(name) in collections and plain not in _TEXTS)
+    return ends or plain in _WHOLE or (thing_of(name) in collections and plain not in _TEXTS)
 
 
 def is_free_text(schema: Schema) -> bool:

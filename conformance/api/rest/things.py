@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Collection, Iterator, Mapping
 from datetime import UTC, datetime
+from functools import lru_cache
 from http import HTTPStatus
 from typing import Any, Final, NamedTuple, TypeGuard
 
@@ -391,9 +392,13 @@ def is_devices(name: str, part: Any, collections: frozenset[str]) -> bool:
     """Return whether a member is the device's: it sets, hides or checks it."""
     given = flat(part) if isinstance(part, dict) else {}
     marked = given.get("readOnly") or given.get("writeOnly") or given.get("format") in {"password", "byte", "binary"}
-    # In lower case with a line between its words: ``created_at`` for ``createdAt``.
-    snake = re.sub(r"[^A-Za-z0-9]+|(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
-    return bool(marked or "const" in given or _OWN.search(snake) or refers(name, given, collections))
+    return bool(marked or "const" in given or _is_own_name(name) or refers(name, given, collections))
+
+
+@lru_cache(maxsize=1024)
+def _is_own_name(name: str) -> bool:
+    """Return whether a name is that of a member that the device sets: ``created_at``, and ``createdAt`` alike."""
+    return _OWN.search(re.sub(r"[^A-Za-z0-9]+|(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()) is not None
 
 
 def is_reordered(value: Any, now: Any, part: Any) -> bool:
