@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from http import HTTPStatus
 from typing import Any, Final
 from urllib.parse import unquote
 
@@ -16,6 +17,7 @@ from conformance.api.call_rules import words_of
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import collection_of
 from conformance.checkers.occasion import ABSENT, MOST_OCTETS, SETTLES_S, Occasion
+from conformance.checkers.untouched import KEEPS
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.json_text import read_json
@@ -25,6 +27,8 @@ from conformance.documents.representation import flat
 from conformance.verdict.evidence import Case
 
 _MOST_THINGS: Final = 1_000
+#: How often a change of state must follow an operation, because once may be by chance.
+TWICE: Final = 2
 _KEPT: Final = "description/refused-keeps"
 # Phrases in a description: for the state to which an operation leads, and for the conditions on which it is refused.
 _LEADS: Final = re.compile(
@@ -77,6 +81,7 @@ class _State:
         told: the operation that told it.
         by: an operation that was accepted since then, and must not change a final state; empty if there is none.
         refused: an operation of the thing that was refused since then.
+        is_kept: whether its description says that nothing changes then.
         ends: the times of its end that were read with it.
     """
 
@@ -86,6 +91,7 @@ class _State:
     told: str = ""
     by: str = ""
     refused: str = ""
+    is_kept: bool = False
     ends: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -135,6 +141,8 @@ class Changes:
         # By path: the thing as it was last read, and the DELETE of it that was refused since then.
         self._there: dict[str, str] = {}
         self._known: dict[str, _State] = {}
+        # How often what was refused has cancelled a thing, by the read and the method.
+        self._undone = Counter[tuple[str, str]]()
         # Paths of things that an operation ends, now or in a while.
         self._ending: set[str] = set()
         # By path: the state that a thing had at the end, where the description calls that final.
@@ -156,8 +164,9 @@ class Changes:
                 yield from self._read(occasion, operation, path)
         elif refuses(status, operation):
             said = f"{method} {path} with status {status}"
-            if (above := path.rpartition("/")[0]) in self._known:
-                self._known[above].refused = said
+            is_kept = status == HTTPStatus.CONFLICT and operation is not None and KEEPS.search(operation.conflict)
+            for state in (self._known[one] for one in (path, path.rpartition("/")[0]) if one in self._known):
+                state.refused, state.is_kept = said, bool(is_kept)
             if method == "DELETE" and path in self._there:
                 self._there[path] = said
         else:
@@ -266,7 +275,9 @@ class Changes:
             wrong = now if lost or (now == before.was and is_late) else ""
         elif before.refused and now.casefold() in _CANCELLED and not is_final and path not in self._ending:
             expected += f" and as {before.refused} must leave it"
-            wrong = now
+            wrong, label = now, before.refused.partition(" ")[0]
+            self._undone[operation.label, label] += before.is_kept
+            is_said = before.is_kept and self._undone[operation.label, label] >= TWICE
         elif is_final and now != before.value and now.casefold() not in _AWAY:
             reason = before.refused or before.by
             expected += f" and as {reason} must leave it" if reason else ""

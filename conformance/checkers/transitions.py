@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 from conformance.api.rest.references import singular
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import collection_of
-from conformance.checkers.changes import FINAL, reads_of, state_in, states_of, word_of
+from conformance.checkers.changes import FINAL, TWICE, reads_of, state_in, states_of, word_of
 from conformance.checkers.occasion import MOST_OCTETS, Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import kinds_of
@@ -61,8 +61,6 @@ _NEGATED: Final = re.compile(r"\b(?:not|never|unless|except|cannot|no)\b", re.IG
 _TURNS: Final = re.compile(r"([^.;:]*?)\bbecomes? `?([\w-]+)", re.IGNORECASE)
 # States that a thing leaves by an operation alone.
 _RESTING: Final = frozenset({"paused", "suspended", "draft", "archived"})
-# How often a state change must follow an operation, because once may be by chance.
-_TWICE: Final = 2
 
 
 class _Turn(NamedTuple):
@@ -147,7 +145,7 @@ class Transitions:
         if before in turn.start and now not in {"", before}:
             is_other = now != turn.to and now in self._starts[operation.template.rpartition("/")[0]]
             self._taken[operation.label, f"to {now}"] += is_other
-            if not is_other or self._taken[operation.label, f"to {now}"] >= _TWICE:
+            if not is_other or self._taken[operation.label, f"to {now}"] >= TWICE:
                 expected = f"{turn.to} as {turn.name}, which {before} becomes by the description"
                 found, cause = f"{now} as {turn.name}", f"{operation.label} {turn.name} becomes"
                 yield occasion.case("description/states", not is_other, expected, found, cause=cause)
@@ -163,7 +161,7 @@ class Transitions:
                 is_taken = occasion.response.ok and state in states
                 self._taken[operation.label, state] += is_taken
                 is_sure = isinstance(value, bool) or state in FINAL or state.casefold() in _RESTING
-                is_sure |= self._taken[operation.label, state] >= _TWICE
+                is_sure |= self._taken[operation.label, state] >= TWICE
                 if not is_taken or is_sure:
                     expected = f"a refusal with 409, as the description says where {name} is {state}"
                     found, cause = f"status {occasion.response.status}", f"{operation.label} {name} {state}"

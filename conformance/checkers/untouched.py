@@ -87,7 +87,8 @@ class Untouched:
                 yield from self._read(occasion, operation.template, path)
         elif refuses(status, operation) and operation is not None and occasion.context.usual:
             label, place = f"{operation.label} with status {status}", f"{path.partition('?')[0].rstrip('/')}/"
-            self._keeping |= {label} if KEEPS.search(operation.text) and status == HTTPStatus.CONFLICT else set()
+            is_kept = status == HTTPStatus.CONFLICT and KEEPS.search(f"{operation.text} {operation.conflict}")
+            self._keeping |= {label} if is_kept else set()
             for target, one in self._seen.items():
                 if self._keeps_all or place.startswith(f"{target}/"):
                     self._seen[target] = one._replace(since=one.since | {label})

@@ -63,7 +63,10 @@ _PATHS = {
         "delete": {"responses": {**_OK, "404": {"description": "no such tag"}}},
     },
     "/jobs/{id}/cancel": {"parameters": [_ID], "post": {"responses": {**_OK, "409": {"description": "ended"}}}},
-    "/jobs/{id}/retry": {"parameters": [_ID], "post": {"responses": {**_OK, "409": {"description": "not ended"}}}},
+    "/jobs/{id}/retry": {
+        "parameters": [_ID],
+        "post": {"responses": {**_OK, "409": {"description": "Not ended. Nothing changes."}}},
+    },
     "/keys": {"post": {"requestBody": _BODY, "responses": _OK}},
     "/keys/{id}": {"parameters": [_UUID], "get": {"responses": _OK}, "delete": {"responses": _FOR_GOOD}},
     "/notes/{id}": {
@@ -443,6 +446,17 @@ def test_what_is_published_later_is_a_doubt(contract):
         again, shown = ("PUT", path, {"rank": 3}, 204, None), ("GET", path, None, 200, {"id": "1", "rank": 3})
         steps = [(0, put), (5, read), (6, read), (9, again), (20, shown)]
         assert _doubts(contract, READ, steps) == doubts
+
+
+def test_what_a_refused_operation_cancels_is_no_doubt_if_nothing_may_change_by_the_description(contract):
+    for name, doubts in (("start", {True}), ("retry", {True, False})):
+        steps = []
+        for at, path in ((0, "/jobs/1"), (9, "/jobs/2")):
+            running, cancelled = ({"id": path[-1], "phase": phase} for phase in ("running", "cancelled"))
+            refused = ("POST", f"{path}/{name}", None, 409, None)
+            steps += [(at, ("GET", path, None, 200, running)), (at + 1, refused)]
+            steps.append((at + 2, ("GET", path, None, 200, cancelled)))
+        assert _doubts(contract, STATES, steps) == doubts
 
 
 def test_deleted_twice_is_no_doubt_where_the_description_says_how_that_is_answered(contract):
