@@ -142,7 +142,7 @@ def plan_lines(rules: CallRules, operations: Sequence[Operation], mapped: Collec
 
     Args:
         rules: what the user says.
-        operations: of the description.
+        operations: operations of the description.
         mapped: the calls that maps in the statement send in this run.
     """
     by_reason: dict[Reason, list[str]] = {}

@@ -35,7 +35,7 @@ class Device:
 
     #: What `--init` writes below the generic tables of a first statement.
     statement_template: str = ""
-    #: By class: why `--init` writes it as a comment although its interfaces answer.
+    #: Why `--init` writes it as a comment although its interfaces answer, by class.
     doubts: Mapping[str, str] = MappingProxyType({})
 
     def __init__(self, run: Run) -> None:

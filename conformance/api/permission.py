@@ -118,7 +118,7 @@ def permitted_methods(run: Run, client: HttpClient, methods: Iterable[str], path
 
     Args:
         run: the data of the run.
-        client: of the interface.
+        client: the client of the interface.
         methods: the methods that a check would send.
         path: request target below the base URL.
         ids: the requirements that the check judges.

@@ -40,12 +40,12 @@ class Answers:
         reads = [one for one in operations if one.method == "GET" and collection_of(one.template)]
         self._items = {collection_of(one.template): one for one in reads}
         self._collections = collections_of(operations)
-        # By path: the last write, until a read has shown what it did.
+        # The last write, until a read has shown what it did, by path.
         self._unread: dict[str, Occasion] = {}
-        # By operation and member: writes whose response shows another value than the next read; below, late members.
+        # Writes whose response shows another value than the next read, by operation and member.
         self._untrue: dict[tuple[str, str], set[bytes]] = defaultdict(set)
-        self._late: set[tuple[str, str]] = set()
-        # By operation and member: numbers that were sent, and those that the responses show.
+        self._late: set[tuple[str, str]] = set()  # members that the device changes after its response
+        # Numbers that were sent, and those that the responses show, by operation and member.
         self._numbers: dict[tuple[str, str], tuple[set[float], set[float]]] = defaultdict(lambda: (set(), set()))
 
     def forget(self) -> None:
@@ -114,7 +114,7 @@ class Answers:
                 continue
             if wrong := next(differences({name: sent[name]}, seen, schema, item.shape, self._collections), ""):
                 self._late.add(key)
-                # What is created later than it is answered, is judged as what is created at once.
+                # A thing that is created after the response is judged like one that is created before it.
                 is_told = is_later and same(told[name], now[name])
                 self._untrue[key] |= {write.request.body} if is_told else set()
                 if is_told and len(self._untrue[key]) >= _SEEN:

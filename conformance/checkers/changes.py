@@ -62,7 +62,7 @@ _IS_FINAL: Final = re.compile(
 )
 _STAYS_SO: Final = re.compile(r"\b(?:stays|remains) `?([\w-]+)`?(?=[.;]|$)")
 _UNLESS: Final = re.compile(r"\b(?:not|no|if|unless|until|when|while|before|after|except|others?)\b", re.IGNORECASE)
-# What the description does not exclude.
+# Why a finding may be no fault: the description does not exclude it.
 _OWN_REASON: Final = "the thing may have changed its state for a reason of its own"
 # Members with the time at which a thing has ended.
 _END: Final = re.compile(r"(?:finished|ended|completed|cancell?ed|stopped)(?:at|on|time|date)")
@@ -104,20 +104,21 @@ class Changes:
         self._states = {
             template: name for template, one in reads.items() if collection_of(template) and (name := state_of(one))
         }
-        # By the thing's path template: states that the description calls final.
+        # States that the description calls final, by the thing's path template.
         self._said_final = {
             template: said
             for template, name in self._states.items()
             if (said := _final(reads[template], name, operations))
         }
-        # By operation: states that only one thing at a time may be in. Below: accepted operations since the last read.
+        # States that only one thing at a time may be in, by operation.
         things = {name: states_of(reads[name], member) for name, member in self._states.items()}
+        # Accepted operations since the last read.
         self._alone = {
             operation.label: found
             for operation in operations
             if (found := _alone(operation, things.get(operation.template.rpartition("/")[0], ())))
         }
-        # By the thing's path template: such states, by what the description says of its creation.
+        # Such states, by what the description says of its creation, by the thing's path template.
         self._single = {
             template: found
             for operation in operations
@@ -125,7 +126,7 @@ class Changes:
             if (operation.method, operation.template.rstrip("/")) == ("POST", collection_of(template))
             if (found := _alone_states(operation, states))
         }
-        # By operation: the state to which it leads by its description.
+        # The state to which it leads by its description, by operation.
         self._leads = {
             operation.label: state
             for operation in operations
@@ -133,19 +134,19 @@ class Changes:
             if (state := leads_to(operation, reads[template], self._states[template]))
         }
         self._claims: dict[str, list[tuple[Occasion, frozenset[str]]]] = defaultdict(list)
-        # By path template: members that never decrease. Below, by path: their last values.
+        # Members that never decrease, by path template. Below, by path: their last values.
         self._growing = {
             operation.template.rstrip("/"): names for operation in reads.values() if (names := _growing(operation))
         }
         self._grown: dict[str, tuple[dict[str, Any], float]] = {}
-        # By path: the thing as it was last read, and the DELETE of it that was refused since then.
+        # The thing as it was last read, and the DELETE of it that was refused since then, by path.
         self._there: dict[str, str] = {}
         self._known: dict[str, _State] = {}
         # How often what was refused has cancelled a thing, by the read and the method.
         self._undone = Counter[tuple[str, str]]()
         # Paths of things that an operation ends, now or in a while.
         self._ending: set[str] = set()
-        # By path: the state that a thing had at the end, where the description calls that final.
+        # The state that a thing had at the end, where the description calls that final, by path.
         self._ended: dict[str, str] = {}
 
     def forget(self) -> None:

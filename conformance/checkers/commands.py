@@ -41,7 +41,7 @@ _WAITING: Final = frozenset({"queued", "pending", "scheduled", "created", "new",
 _IDLE: Final = frozenset({"idle", "ready", "stopped"})
 # Commands that keep an activity from its end.
 _ENDS: Final = frozenset({"cancel", "abort"})
-# By command: names of the switch that it sets, or of the state to which it leads, and the states from which.
+# For each command: names of the switch that it sets, or of the state that follows, and the states before it.
 _OFF: Final = {
     "disable": "enable", "deactivate": "activate", "unlock": "lock", "close": "open", "disarm": "arm",
     "unmute": "mute", "off": "on",
@@ -130,7 +130,7 @@ def _state(verb: str, read: Operation) -> tuple[str, frozenset[str]] | None:
     states = {str(one): plain_name(str(one)) for one in flat(parts_of(read.shape).get(name, {})).get("enum", ())}
     to, start = _STATES.get(verb, (frozenset(), frozenset()))
     usable = frozenset(one for one, plain in states.items() if plain in start)
-    # An activity that was started and is over may be idle again, where no state tells its end.
+    # An activity that has ended may be idle again, if the device has no state for an ended one.
     is_told = verb != "start" or bool(DONE & set(states.values()))
     return (name, usable) if usable and is_told and to & set(states.values()) else None
 
@@ -142,12 +142,12 @@ class Commands:
         known = commands_of([*operations_of(contract)] if contract.openapi_path else [])
         self._commands = {one.operation.label: one for one in known}
         self._reads = {one.read.label for one in known}
-        # By path: the members of a thing at the last read; below, the command since then, with those before it.
+        # The members of a thing at the last read, by path.
         self._seen: dict[str, dict[str, Any]] = {}
-        self._sent: dict[str, tuple[Occasion, dict[str, Any]]] = {}
-        # Members that change by themselves; below, how often a command had no effect, or another than it said.
+        self._sent: dict[str, tuple[Occasion, dict[str, Any]]] = {}  # the last command since then, and earlier ones
+        # Members that change by themselves.
         self._moving: set[tuple[str, str]] = set()
-        self._missed = Counter[str]()
+        self._missed = Counter[str]()  # how often a command had no effect, or another than it said
 
     def forget(self) -> None:
         """Forget all reads: something else may have changed the things."""
@@ -175,7 +175,7 @@ class Commands:
         self._moving |= {(read.label, name) for name in before if not sent and not same(before[name], now.get(name))}
         if sent is not None and sent.operation is not None and sent.response.received_s <= occasion.sent_s:
             command = self._commands[sent.operation.label]
-            # A state may change by itself as well, but not to any other than that of the command.
+            # The device may also change the state itself, but only to the state that the command leads to.
             state = command.state[0] if command.state is not None else ""
             kept = {name: one for name, one in was.items() if name == state or (read.label, name) not in self._moving}
             yield from self._judge(occasion, command, kept, now)

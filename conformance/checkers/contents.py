@@ -61,10 +61,9 @@ class Contents:
         self._parts: dict[_Key, list[Occasion]] = {}
         # Files as clients uploaded them, until another request changes something.
         self._sent: dict[str, Occasion] = {}
-        # By file: hashes of the contents that were uploaded or read. Below: files that were once read with other
-        # contents.
+        # Hashes of the contents that were uploaded or read, by file.
         self._known: dict[str, set[int]] = {}
-        self._differs: dict[str, set[bytes]] = {}
+        self._differs: dict[str, set[bytes]] = {}  # files that were once read with other contents
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange, and of earlier ones that it decides."""

@@ -76,13 +76,13 @@ class EntityTags:
         self._asked: dict[str, Fields] = {}
         self._wrote: dict[str, Occasion] = {}
         self._waiting: dict[str, _Condition] = {}
-        # Whether the device has ever answered 304 and 412. Below: cases that count only once it has.
+        # Whether the device has ever answered 304 and 412: until then, the cases in the lists here do not count.
         self._has_304 = self._has_412 = False
         # How often the device refused a current tag while the content stayed the same.
         self._refused = 0
         self._ignored: list[Case] = []
         self._performed: list[Case] = []
-        # By URL: the response before the last conditional write that was accepted, and the body of that write.
+        # The response before the last conditional write that was accepted, and the body of that write, by URL.
         self._spent: dict[str, tuple[Response, bytes]] = {}
         # 304 responses for an outdated copy, with the then current tag: the next read decides.
         self._stale: dict[str, tuple[Occasion, str]] = {}
@@ -356,9 +356,9 @@ class Conditional:
     """Judges responses to conditions, by the entity tags and dates that the run has seen."""
 
     def __init__(self) -> None:
-        # By URL: entity tags that the device sent. Below: whether it sent Last-Modified.
+        # Entity tags that the device sent, by URL.
         self._tags: dict[str, set[str]] = {}
-        self._dated: set[str] = set()
+        self._dated: set[str] = set()  # whether it sent Last-Modified
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""

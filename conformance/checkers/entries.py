@@ -46,7 +46,7 @@ class _Entry(NamedTuple):
     Attributes:
         sent: what it sent, or what the entry showed before it was deleted.
         told: what the response to its creation shows.
-        operation: of the request; label: that, and how it was answered.
+        operation: the operation of the request; label: that, and how it was answered.
         at_s: when it was answered, s of the monotonic clock.
     """
 
@@ -64,7 +64,7 @@ class Entries:
         operations = operations_of(contract) if contract.openapi_path else ()
         own = {collection_of(operation.template) for operation in operations if operation.method == "GET"}
         creates = {one.template.rstrip("/"): one for one in operations if one.method == "POST"}
-        # By path template: the creation of each list whose entries no other operation reads.
+        # The creation of each list whose entries no other operation reads, by path template.
         self._creates: dict[str, Operation] = {
             template: creates[template]
             for operation in operations
@@ -72,13 +72,13 @@ class Entries:
             if listing_of(operation) is not None and template not in own
         }
         self._collections = collections_of(operations)
-        # By path template of a list: an operation that changes or deletes an entry.
+        # An operation that changes or deletes an entry, by path template of a list.
         self._items = {name: one for one in operations if (name := collection_of(one.template)) in self._creates}
-        # By path: entries by their identifiers until a list has shown them; those that were deleted; all identifiers
-        # that creations gave; the entries in the last whole list; creations and changes that were refused since then.
+        # Each by the path of the list. Entries by their identifiers, until a list has shown them:
         self._made: dict[str, dict[str, _Entry]] = defaultdict(dict)
-        self._gone: dict[str, dict[str, _Entry]] = defaultdict(dict)
-        self._given: dict[str, set[str]] = defaultdict(set)
+        self._gone: dict[str, dict[str, _Entry]] = defaultdict(dict)  # deleted entries
+        self._given: dict[str, set[str]] = defaultdict(set)  # all identifiers in responses to creations
+        # The entries in the last whole list, and the creations and changes that were refused since then:
         self._listed: dict[str, dict[str, dict[str, Any]]] = {}
         self._refused: dict[str, list[_Entry]] = defaultdict(list)
         self._longest: dict[str, int] = defaultdict(int)

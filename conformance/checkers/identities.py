@@ -43,10 +43,10 @@ class Identities:
     """
 
     def __init__(self) -> None:
-        # By collection: identifiers in its list. Below: identifiers under which their own item was read.
+        # Identifiers in its list, by collection.
         self._listed: dict[str, set[str]] = defaultdict(set)
-        self._own: dict[str, set[str]] = defaultdict(set)
-        # By operation and parameter: values that a response has shown as they were asked for.
+        self._own: dict[str, set[str]] = defaultdict(set)  # identifiers under which their own item was read
+        # Values that a response has shown as they were asked for, by operation and parameter.
         self._shown: dict[tuple[str, str], set[str]] = defaultdict(set)
         self._items: dict[str, Operation] | None = None
         self._count = 0
@@ -130,18 +130,18 @@ class Uniques:
     """
 
     def __init__(self) -> None:
-        # By collection: values of created things; below, refused bodies, and members whose values are unique.
+        # Values of created things, by collection.
         self._made: dict[str, set[tuple[str, str]]] = defaultdict(set)
-        self._refused: dict[str, list[dict[str, Any]]] = defaultdict(list)
-        self._unique: dict[str, set[str]] = defaultdict(set)
-        # By collection: members that had the same value in two created things.
+        self._refused: dict[str, list[dict[str, Any]]] = defaultdict(list)  # refused bodies
+        self._unique: dict[str, set[str]] = defaultdict(set)  # members whose values are unique
+        # Members that had the same value in two created things, by collection.
         self._shared: dict[str, set[str]] = defaultdict(set)
-        # By collection: the last bodies of created things.
+        # The last bodies of created things, by collection.
         self._bodies: dict[str, list[dict[str, Any]]] = defaultdict(list)
-        # By collection: for each unique text of what exists, where it was taken; below, how often it was taken again.
+        # Unique texts of existing things, by collection.
         self._held: dict[str, set[str]] = defaultdict(set)
-        self._again = Counter[str]()
-        # By collection and identifier: members as they were read since the last change.
+        self._again = Counter[str]()  # how often another thing got such a text
+        # Members as they were read since the last change, by collection and identifier.
         self._read: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:

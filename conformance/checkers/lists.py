@@ -66,22 +66,22 @@ class Lists:
 
     def __init__(self) -> None:
         self._seen: set[int] = set()
-        # By operation, parameter and requested value: other values that the items in the response had.
+        # Values other than the requested one in the items of a response, by operation, parameter and requested value.
         self._others: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
         self._totals = Totals()
-        # By operation and other parameters: the greatest number of items so far. Below: numbers of items of lists that
-        # no limit cut.
+        # The greatest number of items so far, by operation and other parameters.
         self._longest: dict[object, int] = defaultdict(int)
+        # Numbers of items of lists that no limit cut.
         self._raised: dict[object, dict[int, list[Case]]] = defaultdict(dict)
-        # By operation: limits to which a first page was cut.
+        # Limits to which a first page was cut, by operation.
         self._kept: dict[str, set[int]] = defaultdict(set)
         # Operations whose lists have become shorter by themselves.
         self._shrinking: set[str] = set()
-        # Lists that had fewer items than the default page size although more exist: number of items, total, case, and
-        # whether a limit has shown more since then.
+        # Lists with fewer items than the default page size although more exist: number of items, total, case, and
+        # whether a request with a limit has returned more since then.
         self._short: dict[object, tuple[int, int, Case, bool]] = {}
-        # By path: the items of the whole list, and cases of filters and searches without one of them, until the whole
-        # list shows it, with what they asked for.
+        # The items of the whole list, by path. Then: filters and searches without one of them, until the whole list
+        # shows that item again: its id, the filter as a function, and the case.
         self._whole: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
         self._missed: dict[str, list[tuple[str, Callable[[Mapping[str, Any]], bool], Case]]] = defaultdict(list)
         # How many items a list had, by each value of a parameter that bounds a member.
@@ -89,8 +89,8 @@ class Lists:
         # Values that lists from a level on had since the last change, and how often two such lists were apart.
         self._shown: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(dict)
         self._apart: dict[tuple[str, str], int] = defaultdict(int)
-        # By operation and other parameters: limits with which a list without pages had too few items, until it is long
-        # again.
+        # Limits with which a list without pages had too few items, until it is long again, by operation and other
+        # parameters.
         self._cut: dict[object, dict[int, Case]] = defaultdict(dict)
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:

@@ -148,22 +148,22 @@ class Memory:
         self._own = {path: _read_only(one) | _unwritten(one, path, operations) for path, one in self._items.items()}
         head = contract.openapi.get("info", {}).get("description", "") if operations else ""
         self._is_never = bool(_NEVER_AGAIN.search(str(head)))
-        # By path: members of things at the last read, with what clients sent since.
+        # Members of things at the last read, with what clients sent since, by path.
         self._last: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
-        # By operation and member: values in responses to creations that differ from the declared default.
+        # Values in responses to creations that differ from the declared default, by operation and member.
         self._undefaulted: dict[tuple[str, str], Any] = {}
         # Templates of things that end by themselves, because an identifier came again.
         self._ends: set[str] = set()
         self._deletable = {template for method, template in methods if method == "DELETE"}
-        # By template: created things that were not there, with when they were created.
+        # Created things that were not there, with when they were created, by template.
         self._lost: dict[str, list[tuple[float, Case]]] = defaultdict(list)
-        # Paths that the run created. Below: collections in which something was deleted, and cases that wait for that.
+        # Paths that the run created.
         self._made: set[str] = set()
-        self._gone: set[str] = set()
-        self._back: dict[str, list[Case]] = defaultdict(list)
-        # By template and member: paths of things that lack it though it was sent; below, members that some thing has.
+        self._gone: set[str] = set()  # collections in which something was deleted
+        self._back: dict[str, list[Case]] = defaultdict(list)  # cases that count once something was deleted there
+        # Paths of things that lack it though it was sent, by template and member.
         self._lacking: dict[tuple[str, str], set[str]] = defaultdict(set)
-        self._has: dict[str, set[str]] = defaultdict(set)
+        self._has: dict[str, set[str]] = defaultdict(set)  # members that some thing has
         self._acts = 0
         # How long a value stayed the same, s: of things by template, of members by template and name.
         self._lasted: dict[tuple[str, str], dict[str, float]] = defaultdict(lambda: defaultdict(float))
@@ -397,7 +397,7 @@ class Memory:
             yield from self._judge_deleted(occasion, item, thing, age_s)
             return
         kept = item.template, ""
-        # What another request has ended, PUT creates anew.
+        # If another request has deleted the thing, PUT creates it again.
         thing.absent = response.status in ABSENT
         if response.status in ABSENT and thing.made:
             if age_s > SETTLES_S and not thing.replaced and item.template not in self._ends:

@@ -39,16 +39,15 @@ class Resources:
         self._got: dict[object, _Shown] = {}
         self._heads: dict[object, Occasion] = {}
         self._varies: set[str] = set()
-        # Cases on HEAD that count once the device has shown that it supports HEAD. Below: whether it does, also with
-        # entity tags.
+        # Cases on HEAD that count once the device has shown that it supports HEAD.
         self._without_head: list[Case] = []
-        self._has_head = self._tags_heads = False
-        # Paths of things that exist. Below: requests to them that were answered as if they did not.
+        self._has_head = self._tags_heads = False  # whether it does, also with entity tags
+        # Paths of things that exist.
         self._there: set[str] = set()
-        self._suspects: list[tuple[str, Occasion]] = []
-        # Whether the device refuses methods: OPTIONS, all others. Below: cases that count if it does.
+        self._suspects: list[tuple[str, Occasion]] = []  # requests to them that were answered as if they did not
+        # Whether the device refuses methods: OPTIONS, all others.
         self._refuses: set[bool] = set()
-        self._waiting: dict[bool, list[Case]] = {True: [], False: []}
+        self._waiting: dict[bool, list[Case]] = {True: [], False: []}  # cases that count if it does
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange, and of earlier ones that it decides."""

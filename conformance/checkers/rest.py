@@ -39,7 +39,7 @@ _DOCUMENTS: Final = (
     fields.promised_fields, declared.crash, declared.server_error, declared.status, declared.body, texts.whole,
 )  # fmt: skip
 
-# What a device may show later, or as what is in effect, if its description says so.
+# Requirements whose failures only warn if the description says that a device applies writes later or partly.
 _STORED: Final = frozenset(f"description/{name}" for name in ("written-is-read", "patch", "defaults"))
 
 
@@ -49,7 +49,7 @@ class Histories:
     def __init__(self, contract: Contract) -> None:
         self._contract = contract
         self._memory = Memory(contract)
-        # Those that remember what a request of unknown effect may change.
+        # Checkers that remember values which a request of unknown effect may change.
         self._states = (
             Writes(contract), Changes(contract), Untouched(contract), Answers(contract), Commands(contract),
             Parts(contract), Siblings(contract),
@@ -72,7 +72,7 @@ class Histories:
             path = occasion.context.target.partition("?")[0]
             resource = resource_at(self._contract, path) if is_stored else None
             late = doubt_of_write(*resource.operations.values()) if resource is not None else ""
-            # What such a resource shows otherwise is one finding, and not one for each member.
+            # All differences of such a resource are one finding, not one for each member.
             yield replace(case, doubt=late, cause=late) if late and not case.doubt else case
 
 
@@ -81,7 +81,7 @@ class RestCheckers:
 
     Args:
         contract: by which it is judged.
-        base_url: of the interface.
+        base_url: the base URL of the interface.
         elsewhere: URLs below it that belong to other interfaces.
     """
 

@@ -38,7 +38,7 @@ class SoapThings:
 
     def __init__(self, resources: Resources) -> None:
         self._resources, self._histories = resources, Histories(resources.contract)
-        # By list: identifiers of the things that it had.
+        # Identifiers of the things that it had, by list.
         self._known: dict[str, set[str]] = defaultdict(set)
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
@@ -57,7 +57,7 @@ class SoapThings:
     def _cases(self, seen: Exchange) -> Iterator[Case]:
         contract = self._resources.contract
         context = RequestContext.of(contract, BASE, seen.request)
-        # What was accepted though the XML schema forbids it, but for a read, is no success here.
+        # Except for reads, accepting a message that the XML schema forbids does not count as success here.
         is_allowed = seen.response.ok and seen.request.method not in SAFE
         occasion = Occasion(contract, seen, context, is_allowed) if context is not None else None
         for found in self._histories(occasion) if occasion is not None else ():

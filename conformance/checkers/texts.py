@@ -21,7 +21,7 @@ from conformance.verdict.evidence import Case
 _MOST: Final = 1000
 # Shorter texts are compared with later reads only.
 _LONG: Final = 100
-# What stands for a character that could not be read (Unicode 5.22).
+# The replacement for a character that could not be decoded (Unicode 5.22).
 _LOST: Final = "\ufffd"
 _SPACE, _SEPARATOR = re.compile(r"\s+"), re.compile(r"[\W_]+")
 
@@ -45,7 +45,7 @@ class Texts:
     def __init__(self) -> None:
         self._shown: dict[str, dict[str, Any]] = {}
         self._written: dict[str, _Write] = {}
-        # By URL: texts that earlier writes gave, which a device that stores later may still show.
+        # Texts that earlier writes gave, which a device that stores later may still show, by URL.
         self._earlier: dict[str, frozenset[str]] = {}
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:

@@ -134,7 +134,7 @@ class Totals:
     def __init__(self) -> None:
         self._counts: dict[tuple[str, str, frozenset[tuple[str, str]]], _Count] = defaultdict(_Count)
         self._longest: dict[str, int] = defaultdict(int)
-        # By path, total and filters: what the whole list tells, and parts of it that tell another total.
+        # The total in the whole list, and parts of the list with another total, by path, total and filters.
         self._told: dict[tuple[str, str, frozenset[tuple[str, str]]], int] = {}
         self._apart: dict[tuple[str, str, frozenset[tuple[str, str]]], list[Case]] = defaultdict(list)
         self._changed_s = float("-inf")
@@ -296,20 +296,20 @@ class Sublists:
         operations = operations_of(contract) if contract.openapi_path else ()
         reads = {one.template.rstrip("/"): one for one in operations if one.method == "GET"}
         below = {path: reads[above] for path in reads if (above := path.rpartition("/")[0]) in reads}
-        # By path template of a list: the numbers that the thing above it tells too.
+        # Members of the parent that a list must confirm, by path template of the list.
         self._numbers = {
             path: numbers_of(one, reads[path]) for path, one in below.items() if collection_of(one.template)
         }
         self._above = {path.rpartition("/")[0] for path, numbers in self._numbers.items() if numbers}
-        # By path of a list: the path of a thing beside it that tells how many items it has.
+        # The path of a resource, such as `/stats`, that contains the number of items, by path of a list.
         counters = counters_of(operations)
         self._beside = {path: one.template.rstrip("/") for path, (one, _) in counters.items()}
         self._numbers |= {path: numbers for path, (_, numbers) in counters.items()}
         self._above |= {*self._beside.values()}
-        # By path: the path template and the page of a list, and what a thing shows, since the last change.
+        # The path template and the page of a list, and what a thing shows, since the last change, by path.
         self._lists: dict[str, tuple[str, Page]] = {}
         self._things: dict[str, dict[str, Any]] = {}
-        # By path: the items of a list before a request that leaves them, and that.
+        # The items of a list before a request that leaves them, and that, by path.
         self._before: dict[str, tuple[tuple[str, ...], str]] = {}
         # Numbers that once were right, as others may count something else.
         self._right: set[tuple[str, str]] = set()

@@ -77,7 +77,7 @@ class Transitions:
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
         self._reads = {path: read for path, read in reads_of(operations).items() if collection_of(path)}
-        # By operation: the things on whose state it depends, by path template, and what each forbids.
+        # The things on whose state it depends, by path template, and what each forbids, by operation.
         self._barred = {
             operation.label: found
             for operation in operations
@@ -99,10 +99,10 @@ class Transitions:
         for operation in operations:
             if turn := self._turns.get(operation.label):
                 self._starts[operation.template.rpartition("/")[0]] |= turn.start
-        # Operations on a thing that are refused the second time; below, paths of those that were accepted.
+        # Operations on a thing that are refused the second time.
         self._once = {one.label for one in operations if one.parameter("path") and ONCE.search(one.text)}
-        self._done: set[str] = set()
-        # By path: members of the thing at the last read.
+        self._done: set[str] = set()  # paths of those that were accepted
+        # Members of the thing at the last read, by path.
         self._seen: dict[str, dict[str, Any]] = {}
         self._taken: Counter[tuple[str, str]] = Counter()
 
@@ -189,7 +189,7 @@ def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]
     That says "409 if the job is running", "409 unless it is queued", or "in another state it is answered 409".
     """
     parts, name = flat(read.shape or {}).get("properties", {}), state_member(read)
-    # By member: its values, with the word for each in a text.
+    # Its values, with the word for each in a text, by member.
     known = {word: {"true": word, "false": ""} for word, one in parts.items() if kinds_of(one) == {"boolean"}}
     known |= {name: {state: state for state in states_of(read, name)}} if name else {}
     thing, found = singular(collection_of(read.template).rpartition("/")[2]), defaultdict[str, set[str]](set)

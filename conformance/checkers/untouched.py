@@ -64,10 +64,10 @@ class Untouched:
         self._seen: dict[str, _Seen] = {}
         # Operations whose own description says that a refused request changes nothing.
         self._keeping: set[str] = set()
-        # By template and refused operation: how many refusals were seen. Below: members that had changed after them.
+        # How many refusals were seen, by template and refused operation.
         self._count: Counter[tuple[str, str]] = Counter()
-        self._changed: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
-        # By path: a case that fails if two reads without a request in between show a member unchanged, by its name.
+        self._changed: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)  # members that had changed after them
+        # A case that fails if two reads without a request in between show a member unchanged, by its name, by path.
         self._waiting: dict[str, tuple[str, Any, Case]] = {}
 
     def forget(self) -> None:
@@ -111,7 +111,7 @@ class Untouched:
             return
         label = next(iter(before.since), "")
         if not label and path in self._waiting:
-            # What goes on by itself, as a job does, changes a moment later too, and does not go back.
+            # A value that changes by itself, such as a job's progress, changes again a moment later, and not back.
             name, was, case = self._waiting.pop(path)
             yield from [case] if any(same(now.get(name), one) for one in (before.members.get(name), was)) else []
         key = template, label
@@ -158,9 +158,9 @@ class Parts:
             for above, _, name in (path.rpartition("/"),)
             if name in (own := parts_of(shapes.get(above))) and flat(own[name]) == flat(shapes.get(path) or {})
         }
-        # By path: what reads have shown since the last change. Below: how often two differed.
+        # What reads have shown since the last change, by path.
         self._values: dict[str, Any] = {}
-        self._count = Counter[str]()
+        self._count = Counter[str]()  # how often two differed
 
     def forget(self) -> None:
         """Forget all reads: something else may have changed the resources."""

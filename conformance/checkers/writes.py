@@ -165,22 +165,22 @@ class Writes:
         self._collections = collections_of(operations)
         self._states: dict[str, _State] = {}
         self._writes: dict[str, list[Occasion]] = defaultdict(list)
-        # By path: members in the last response, to a read or a patch.
+        # Members in the last response, to a read or a patch, by path.
         self._last: dict[str, dict[str, Any]] = {}
-        # By path: writes that no read has shown yet.
+        # Writes that no read has shown yet, by path.
         self._late: dict[str, Occasion] = {}
         self._moving: set[tuple[str, str]] = set()
-        # By operation and member: bodies with which it failed; a single one may be chance.
+        # Bodies with which a member was wrong, by operation and member: a single one may be chance.
         self._doubts: dict[tuple[str, str], set[bytes]] = defaultdict(set)
-        # Members that once kept a fraction, and one other than a half.
+        # Members that once kept a fraction, and those that kept another fraction than a half.
         self._precise: set[tuple[str, str]] = set()
         self._fine: set[tuple[str, str]] = set()
-        # By template and member: methods whose values were read as they were sent, and patches that changed nothing.
+        # Methods whose values were read as they were sent, and patches that changed nothing, by template and member.
         self._taken: dict[tuple[str, str], set[str]] = defaultdict(set)
         self._ignored: dict[tuple[str, str], dict[bytes, Case]] = defaultdict(dict)
-        # By template, member, method and value: how often it was as before after such a request.
+        # How often it was as before after such a request, by template, member, method and value.
         self._refused = Counter[tuple[str, str, str, str]]()
-        # By path: the last accepted body, which a device may still apply after a refused request.
+        # The last accepted body, which a device may still apply after a refused request, by path.
         self._accepted: dict[str, Any] = {}
 
     def forget(self) -> None:
@@ -241,7 +241,7 @@ class Writes:
                     occasion, item, one, _Sandwich(state.members, now, frozenset(), is_old=True)
                 )
             write = writes[0] if len(writes) == 1 else late if not writes and not changed else None
-            # What an earlier write gave, and the read after that did not show yet.
+            # A value of an earlier write, which the read after it did not show yet.
             is_late = writes and late is not None and shows_new(read_json(late.request.body).value, state.members, now)
             if write is not None and (state.at_s <= write.sent_s or write is late) and not is_late:
                 moving = frozenset(one for one in names if (item.template, one) in self._moving)
@@ -486,7 +486,7 @@ class Writes:
             if value is None:
                 default = shape.get("default")
                 expected = f"no {name}, which {change.label} removed by null (RFC 7396 2)"
-                # Where the thing always has the member, null may set a default; and it may be shown as empty.
+                # If the member is required, null may set a default, and a read may show it as empty.
                 is_needed = name in flat(item.shape or {}).get("required", ()) and not fits(shape, None)
                 is_kept = same(now, was) and not (same(was, default) or is_needed) and was not in ("", [], {})
                 wrong = f"{clip(was)} as {name}" if is_kept and change.is_settled(name, change.sent_value) else ""

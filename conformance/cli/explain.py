@@ -26,7 +26,7 @@ EFFORTS = (
     "At each effort, unless a check says otherwise. Quick tries about a tenth of the cases that standard generates, "
     "and every other value of those that a check lists. Deep generates as many cases as --minutes allows."
 )
-#: By prerequisite: what a run needs to judge the requirement, in words.
+#: What a run needs to judge a requirement, in words, for each key of `needs`.
 NEEDS = {
     Prerequisite.MOTION: "permission to move the device (--allow-motion)",
     Prerequisite.OBSERVER: "a view of what requests cause: a ROS probe (--ros-domain-id), or the device's own list",

@@ -15,7 +15,7 @@ class ExitCode(IntEnum):
     INTERRUPTED = 130
 
 
-#: By the verdict of a result.
+#: Exit code for each verdict of a result.
 OF_VERDICT: Final = {
     "conformant": ExitCode.PASSED,
     "not-conformant": ExitCode.FAILED,

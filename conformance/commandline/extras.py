@@ -6,7 +6,7 @@ from typing import Final
 
 _ROS: Final = "rclpy"
 _SOAP: Final = ("zeep", "xmlschema")
-#: By extra of pyproject.toml: the modules that it installs. `roaas robot` names its own.
+#: Modules that each extra of pyproject.toml installs. `roaas robot` names its own.
 EXTRAS: Final = {
     "soap": _SOAP,
     "load": (*("locust", "hdrh", "matplotlib", "numpy", "httptools", "scipy", "websockets"), *_SOAP),

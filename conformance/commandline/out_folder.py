@@ -150,9 +150,9 @@ def write_json(path: Path, value: Any, **options: Any) -> Path:
     """Write JSON atomically; return its path. It stays JSON, whatever in it was a secret.
 
     Args:
-        path: of the file.
+        path: the path of the file.
         value: its content.
-        options: of json.dumps().
+        options: options of json.dumps().
 
     Raises:
         OSError: as above.

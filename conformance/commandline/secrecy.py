@@ -37,7 +37,7 @@ _CUT: Final = re.compile(r"\Z|[\s\"'`<\\]")
 _ELLIPSIS: Final = re.compile(r"…+|\.{3,}")
 _SHORTEST_CUT: Final = 4  # fewest characters of a secret before an ellipsis that are recognised
 _LONGEST_CUT: Final = 256
-# Escapes may be nested: they are undone so many times.
+# Escapes may be nested: decode them up to this many times.
 _DEPTH: Final = 4
 _ESCAPE: Final = re.compile(
     r"%(?:25){0,8}(?:(?P<wide>(?:[C-Dc-d][0-9A-Fa-f]|[Ee][0-9A-Fa-f]%(?:25){0,8}[89ABab][0-9A-Fa-f])"
@@ -99,11 +99,11 @@ class Secrets:
         # Cache: many texts are written repeatedly.
         self._seen: dict[str, str] = {}
         self._weak: dict[str, str] = {}
-        # Forms of secrets that are compared without regard to case. Below: the others.
+        # Forms of secrets that are compared without regard to case.
         self._folded: tuple[_Form, ...] = ()
-        self._exact: tuple[_Form, ...] = ()
+        self._exact: tuple[_Form, ...] = ()  # all other forms
         self._dumps: tuple[_Form, ...] = ()
-        # By the last characters before an ellipsis: secrets that may be cut there, and after how many characters.
+        # Secrets that may be cut there, and after how many characters, by the last characters before an ellipsis.
         self._cuts: dict[str, list[tuple[_Form, int]]] = {}
 
     def __bool__(self) -> bool:

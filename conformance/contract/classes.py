@@ -91,7 +91,7 @@ class ConformanceClass:
         title: a description.
         interfaces: the interfaces that it judges.
         one_is_enough: whether one of these interfaces suffices; otherwise all that the contract describes must respond.
-        topic: of its requirements that name none.
+        topic: the topic of its requirements that name none.
         within: the class that has its requirements in a contract that does not have this class; empty if there is none.
         beside: whether a device that is judged by its own description has it beside its verdict: the class is judged
             and shown, and decides nothing, unless a claim names it.

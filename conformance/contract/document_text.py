@@ -22,7 +22,7 @@ _LONGEST_NAME: Final = 8_192
 _MARKS_OF_VALUES: Final = ",[{"
 # Most digits of a whole number: a longer one exceeds every double.
 _MOST_DIGITS: Final = 400
-# A message shows so many characters of a name, and so many names of a path.
+# Most characters of a name, and most names of a path, that a message shows.
 _SHOWN: Final = 60
 _PLAIN: Final = "roaas:plain"
 _TAG: Final = "tag:yaml.org,2002:"
@@ -126,7 +126,7 @@ class _Reader:
     def __init__(self, text: str) -> None:
         self._loader = _Loader(text)
         self._event: Any = None
-        # By anchor: its value, and the nodes and bytes that an alias adds.
+        # Its value, and the nodes and bytes that an alias adds, by anchor.
         self._anchors: dict[str, tuple[Any, int, int]] = {}
         self._nodes = self._octets = 0
 

@@ -157,7 +157,7 @@ def _number(kind: inspect.IntType | inspect.FloatType, _: str) -> str:
     return f"a {noun}, and not negative" if low == 0 else f"a finite {noun}"
 
 
-# By regular expression: what a text in a statement has to be, in words.
+# What a text in a statement must be, in words, for each regular expression of the schema.
 _TEXTS: Final = {
     r"^[A-Z]+ /\S*$": "a method and a path on the device, such as 'POST /login', and no URL",
     r"^/\S+$": "a full ROS name, which begins with '/'",

@@ -42,7 +42,7 @@ _MOVED = {
     "#/parameters/": "#/components/parameters/",
     "#/responses/": "#/components/responses/",
 }
-# By collectionFormat: style and explode of OpenAPI 3.
+# Style and explode of OpenAPI 3 for each collectionFormat of Swagger 2.0.
 _COLLECTIONS = {
     "csv": ("form", False),
     "ssv": ("spaceDelimited", False),
@@ -207,7 +207,7 @@ def _as_openapi_3(value: Any) -> Any:
     return found
 
 
-# All files of a description together: _MOST_FILES, _MOST_OCTETS, and below the time to fetch them, s.
+# Limits for all files of a description together: number, bytes, and time to fetch them, s.
 _MOST_FILES: Final = 5_000
 _MOST_OCTETS: Final = 64 * 1024 * 1024
 _MOST_S: Final = 120.0
@@ -493,7 +493,7 @@ def _with_defaults(server: Schema) -> str:
     return host + quote(url[begin:], safe="%/:?#[]@!$&'()*+,;=~\\", errors="surrogatepass")
 
 
-# Budget of an overlay: _MOST_PLACES that its actions change, _MOST_NODES values that they add, and below the time, s.
+# Limits for an overlay: places that its actions change, values that they add, and time, s.
 _MOST_PLACES: Final = 50_000
 _MOST_NODES: Final = 1_000_000
 _MOST_OVERLAY_S: Final = 10.0

@@ -237,7 +237,7 @@ def opened(schema: Any) -> Any:
     return changed_alike(found, "opened")
 
 
-#: By name: functions that change the schema behind a lazy reference.
+#: Functions that change the schema behind a lazy reference, by the name that the reference gives.
 CHANGES: Final[dict[str, Callable[[Any], Any]]] = {"modern": modern, "opened": opened}
 
 

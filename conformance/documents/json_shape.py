@@ -235,7 +235,7 @@ def validator_of(schema: Schema, holds: Callable[[str, Any], bool] | None = None
         schema: to be compiled.
         holds: returns whether a value is valid by the schema of a lazy reference. Without it, all that the schema
             refers to is compiled with it, as often as others do so.
-        options: of jsonschema-rs.
+        options: options of jsonschema-rs.
 
     Raises:
         ValueError: it is no JSON Schema.
@@ -456,7 +456,7 @@ def _each_finite(value: Any) -> bool:
 
 
 _SINGLE: Final = 3.4028234663852886e38
-# By format of the OpenAPI Initiative's Format Registry: lowest and highest value. Any JSON number may be a double.
+# Lowest and highest value, by format of the OpenAPI Initiative's Format Registry. Any JSON number may be a double.
 _RANGES: Final[dict[str, tuple[float, float]]] = {
     **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
     **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},

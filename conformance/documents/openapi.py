@@ -44,7 +44,7 @@ class Body:
 
     Attributes:
         media_type: without parameters.
-        schema: of the value.
+        schema: the schema of the value.
         examples: example values (text for XML) in the description; may be empty.
         encoding: how the fields of a form are written, where the description says it.
     """
@@ -63,7 +63,7 @@ class Operation:
         id: operationId, or method and path without one.
         method: in upper case.
         template: path with ``{name}`` for parameters.
-        parameters: of path and operation.
+        parameters: parameters of path and operation.
         bodies: possible request bodies, by media type.
         body_required: whether a request must have a body.
         responses: schemas of response bodies, by status ("200", "2XX", "default") and media type; further members
@@ -430,7 +430,7 @@ def inside_prefix(contract: Contract, path: str) -> bool:
     }
 
 
-#: Other keywords of OpenAPI 3 describe these, so header parameters of these names are ignored (OpenAPI 3.1, 4.8.12.2).
+#: Header parameters that OpenAPI 3 ignores, because other keywords describe them (OpenAPI 3.1, 4.8.12.2).
 IGNORED: Final = frozenset({"accept", "content-type", "authorization"})
 # Headers by which a server may see another method, target or end of the request than the request line has. They could
 # turn a permitted GET into a DELETE, or send a credential to another host behind the same gateway.

@@ -50,7 +50,7 @@ class Described:
         document: that it is in.
         path: its template.
         item: the path item, without a reference.
-        operation: of it.
+        operation: the operation of it.
     """
 
     document: Schema
@@ -285,7 +285,7 @@ def _name_of(parameter: Parameter) -> str:
     return f"{_KINDS.get(parameter.where, parameter.where)} {parameter.name}"
 
 
-# By type of security scheme: what a client has to know of it.
+# Members of a security scheme that a client must know, by the scheme's type.
 _KNOWN: Final = {"apiKey": ("in", "name"), "http": ("scheme",), "openIdConnect": ("openIdConnectUrl",)}
 # A credential as a client knows it, with its scopes. Several may be needed together.
 _Alternative = dict[tuple[str, ...], frozenset[str]]

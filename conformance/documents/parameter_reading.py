@@ -295,7 +295,7 @@ class Part:
     """One part of a ``multipart/form-data`` body.
 
     Attributes:
-        media_type: of its content, without parameters; empty without one.
+        media_type: the media type of its content, without parameters; empty without one.
         is_file: whether it has a file name.
         content: its bytes.
     """

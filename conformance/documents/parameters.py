@@ -22,12 +22,12 @@ class Parameter:
         name: as in requests.
         where: path, query, header or cookie.
         required: whether requests must have it.
-        schema: of its value.
+        schema: the schema of its value.
         examples: example values in the description; may be empty.
         also: other names of it, for instance in ROS (x-roaas-also).
         style: how arrays and objects are written.
         explode: whether their items are written apart.
-        media_type: of a parameter with ``content``; empty if it is written by its style.
+        media_type: the media type of a parameter with ``content``; empty if it is written by its style.
         reserved: whether reserved characters are written as they are (allowReserved).
         empty: whether it may be written without a value (allowEmptyValue).
         says: the description of it.
@@ -53,7 +53,7 @@ class Encoding:
 
     Attributes:
         style, explode: as those of a query parameter.
-        media_type: of its value; empty where the description does not say it.
+        media_type: the media type of its value; empty where the description does not say it.
     """
 
     style: str = "form"

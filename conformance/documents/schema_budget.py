@@ -15,7 +15,7 @@ from conformance.documents.json_schema import Schema, UnresolvedError, target_of
 _MOST_AT_ONCE: Final = 5_000
 # Largest value that a schema may demand: members, items and characters.
 _LARGEST: Final = 1_000_000
-# By keyword: most values. Each value is sent in a request of its own.
+# Most values of these keywords: each value is sent in a request of its own.
 _MOST_VALUES: Final = {"enum": 50_000, "examples": 10_000}
 _DEEPEST: Final = 60  # references in a chain
 _MOST_STEPS: Final = 50_000  # how often schemas are visited again

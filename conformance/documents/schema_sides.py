@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, target_of
 
-#: Keywords with one schema; below, those with several schemas, and with several by name.
+#: Keywords with one schema, then those with a list of schemas, and those with an object of schemas.
 ONE: Final = (
     "items", "additionalProperties", "contains", "propertyNames", "not", "if", "then", "else", "unevaluatedItems",
     "unevaluatedProperties",
@@ -43,10 +43,10 @@ class Side:
     """The schemas of one description for values that go in one direction.
 
     Args:
-        name: of the side, in its references.
+        name: the name of the side, in its references.
         document: as one OpenAPI 3 document.
         request: whether clients send the values.
-        media_type: of the values.
+        media_type: the media type of the values.
     """
 
     def __init__(self, name: str, document: Schema, *, request: bool, media_type: str = "") -> None:

@@ -83,7 +83,7 @@ def text_of(value: Any) -> str:
     return str(value)
 
 
-#: By style: separator between items where it is no comma. ``tabDelimited`` is Swagger 2.0's tsv.
+#: Separators between items, for styles without a comma. ``tabDelimited`` is Swagger 2.0's tsv.
 SEPARATORS = {"spaceDelimited": " ", "pipeDelimited": "|", "tabDelimited": "\t"}
 # Reserved characters that no server takes for the end of a parameter (RFC 3986 2.2).
 _RESERVED = "/?:@!$'()*,"

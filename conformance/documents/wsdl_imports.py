@@ -199,7 +199,7 @@ def gaps(
     Args:
         found: the documents.
         types: their schemas, compiled.
-        location: that of the WSDL.
+        location: the location of the WSDL.
         named: who names an element in a message, and its tag.
     """
     own = f"{location.partition('://')[0]}://{urlsplit(location).netloc}/" if "://" in location else ""

@@ -52,7 +52,7 @@ def write_soap_pack(
     Args:
         folder: where; made if it is not there.
         found: what the WSDL describes.
-        location: that of the WSDL.
+        location: the location of the WSDL.
         documents: all documents by location.
         address: where the service is, whatever the WSDL says; empty means what it says.
         named: locations of schemas that were found by their namespace.

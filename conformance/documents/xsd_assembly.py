@@ -20,7 +20,7 @@ from conformance.transport.reach import joined
 _IMPORT, _INCLUDE = clark(XSD, "import"), clark(XSD, "include")
 _REDEFINE: Final = (clark(XSD, "redefine"), clark(XSD, "override"))
 _SCHEMA: Final = clark(XSD, "schema")
-# By attribute: the kind of component that it names; a type may be simple or complex.
+# The kind of component that each attribute names; a type may be simple or complex.
 _NAMED: Final = {
     "type": "type",
     "base": "type",

@@ -39,7 +39,7 @@ def value_of(element: etree._Element | None, declared: Element | None) -> Any:
         return _scalar_of(kind if isinstance(kind, Simple) else kind.text or Simple("string"), text_of(element))
     found: dict[str, Any] = {} if kind.text is None else {"value": _scalar_of(kind.text, text_of(element))}
     types = {name: simple for name, simple, _ in kind.attributes}
-    # What is left out has its default (XML Schema Part 1, 3.2.1).
+    # A missing attribute has its default (XML Schema Part 1, 3.2.1).
     texts = {name: simple.default for name, simple in types.items() if simple.default}
     texts |= {str(name): str(text) for name, text in element.attrib.items()}
     found |= {local(name): _scalar_of(types[name], text) for name, text in texts.items() if name in types}
@@ -76,7 +76,7 @@ def schema_of(
         declared: the element.
         depth: how deep it is.
         given: values of members by name; then texts have a default, and attributes are called ``@name``, as in a map.
-        branch: of each choice, in rotation; None means all of them, as optional.
+        branch: the branch of each choice, in rotation; None means all of them, as optional.
     """
     kind, at, text = declared.type, "" if given is None else "@", "value" if given is None else "#text"
     own: dict[str, Any] = {"description": declared.documentation} if declared.documentation else {}

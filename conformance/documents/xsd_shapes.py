@@ -497,7 +497,7 @@ _MOMENTS: Final[Mapping[str, Callable[[str], datetime | time]]] = {
 _DURATION: Final = re.compile(
     r"(-?)P(?:(\d+)Y)?(?:(\d+)M)?(?:(\d+)D)?(?:T(?:(\d+)H)?(?:(\d+)M)?(?:(\d+(?:\.\d+)?)S)?)?", re.ASCII
 )
-# What makes two forms of a value equal (3.2.2, 3.2.6, 3.2.15, 3.2.16, 3.3.2).
+# Functions that map all forms of a value to one text (XML Schema 2, 3.2.2, 3.2.6, 3.2.15, 3.2.16, 3.3.2).
 _READ: Final[Mapping[str, Callable[[str], str]]] = {
     "boolean": lambda text: {"1": "true", "0": "false"}.get(text, text),
     "duration": _duration,

@@ -40,7 +40,7 @@ _UNITS: Final = {
     "mm": r"_mm(?:_|$)|\b(?:mm|millimet)", "cm": r"_cm(?:_|$)|\b(?:cm|centimet)", "m": r"_m(?:_|$)|\bmet(?:re|er)s?\b",
     "deg": r"_(?:deg(?:rees)?|°)(?:_|$)|\bdeg(?:rees?)?\b|°", "rad": r"_rad(?:_|$)|\brad(?:ians?)?\b",
 }  # fmt: skip
-# What the name of a way, a position or a velocity has beside the name of its axis.
+# Parts of a number's name that do not name the axis: words for a way, a position or a velocity.
 _BESIDE: Final = re.compile(
     r"(?:^|_)(?:positions?|pos|distance|delta|offset|relative|steps?|target|velocity|vel|speed|rate|mm|cm|m|deg|degrees|rad|s)"
     r"(?=_|$)",
@@ -64,7 +64,7 @@ _MOST: Final = re.compile(
     rf"\s*(?:±|\+/-)?\s*{_AMOUNT}\s*{_UNIT}",
     re.IGNORECASE,
 )
-# What may change them.
+# Words for a condition under which other limits apply.
 _DOUBTS: Final = re.compile(
     r"\b(?:default|recommend|typical|usual|example|e\.g|unless|except|if|when|while|depend|about|approx|above|beyond|may)",
     re.IGNORECASE,
@@ -84,7 +84,7 @@ _FORMS: Final = ("application/x-www-form-urlencoded", "multipart/form-data")
 _PART = 0.1
 _TURN = 0.1
 _WAY = 0.05
-# By unit, how many of them are in one m, or about so many in one rad.
+# Units in one metre, and roughly in one rad.
 _IN_UNITS: Final = {"mm": 1000.0, "cm": 100.0, "deg": 50.0}
 
 
@@ -95,7 +95,7 @@ class Commanded:
     Attributes:
         name: what a map calls it.
         place: its JSON pointer in the body; of a path parameter its name in braces.
-        schema: of the number.
+        schema: the schema of the number.
         turns: whether its names say that it is an angle, or turns the device.
         direction: where the body says its sign, and what it says there if it is positive or negative; None: the number
             has a sign.
@@ -358,7 +358,7 @@ def members_in(part: Schema) -> Iterator[tuple[str, Schema]]:
     first, length = part.get("prefixItems", ()), list_length(part)
     said = _WORDS.findall(str(part.get("description", "")))
     names = [str(name).lower() for name in (_item_names(part) or said)]
-    # Where a list's description has as many limits as items, they are those of the items in their order.
+    # If a list's description has as many limits as items, each limit is for the item at the same place.
     ranges, unit = [one[0] for one in _RANGE.finditer(str(part.get("description", "")))], unit_of("", part)
     for index in range(length):
         item = first[index] if index < len(first) else part.get("items")

@@ -123,8 +123,8 @@ class Looks:
 
         Args:
             numbers: what is commanded.
-            path: of the operation that commands them.
-            operations: those that are read.
+            path: the path of the operation that commands them.
+            operations: operations that are read.
         """
         told = {operation: self._named_places(operation, numbers, path) for operation in operations}
         found: dict[str, tuple[str, str]] = {}

@@ -60,7 +60,7 @@ _MOST_NUMBERS, _MOST_READS = 8, 6
 READY_S = 20.0
 #: A device that is ready within this time counts as ready at once, s.
 _AT_ONCE_S = 0.3
-#: No state is a text of so many characters.
+#: A longer text is no state, characters.
 _LONG = 40
 # Members of a response that say whether the request failed, with what they have if it did not.
 _FAILED: Final = (
@@ -164,7 +164,7 @@ def plan_of(
     """Return the operations to command and to read, from a description.
 
     Args:
-        operations: of the description.
+        operations: operations of the description.
         drive: names the operation that commands.
         read: names the one that shows where the device is; None if it is chosen.
         rules: what may be called.
@@ -386,7 +386,7 @@ class Finder(ABC):
     def _waits(self) -> bool:
         """Wait a little while the device gets ready; return whether it still has time for that."""
         self._clock.sleep(_PACE_S)
-        # What the device says before a command that it accepts, and not while it follows that.
+        # Texts that the device returns before an accepted command, and not while it carries out the command.
         self._last_words = self._states() if self._words else {}
         return bool(self._used.steps) and self._clock.now() < self._asked + READY_S
 

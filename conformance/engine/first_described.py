@@ -205,7 +205,7 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
     first = goes or drives
     if first is None:
         return
-    # One reading tells all of a map.
+    # A map has one operation that reads everything.
     drives = drives if drives and drives.state is first.state else None
     schemas = dict(numbers_in(first.state.shape or {}))
     schemas |= {at: one.shape or {} for at, one in first.reads.items()}

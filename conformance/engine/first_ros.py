@@ -30,7 +30,7 @@ from conformance.scenarios.ros.robot import ProbeError, Robot
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import NoAnswerError
 
-# Budget of a schema: _LEAVES fields, _DEPTH levels, and below objects, and names of the graph in a comment.
+# Limits for a schema: fields, levels and objects; and for a comment: names from the graph.
 _LEAVES: Final = 500
 _DEPTH: Final = 8
 _PLACES: Final = 50
@@ -49,7 +49,7 @@ _STATE: Final = re.compile(r"[/_](state|status|phase)$")
 _SENDS: Final = frozenset({"POST", "PUT", "PATCH"})
 # Names of booleans beside a message, and their value if the message is too old or missing.
 _FAILURES: Final = {r"/(is_?)?(stale|outdated|expired)$": True, r"/(success|ok)$": False}
-# What the letter before an axis means, as in qw and vx.
+# The group of values that a letter before an axis stands for, as in qw and vx.
 _LETTERS: Final = {"": "position", "q": "orientation", "v": "linear", "w": "angular"}
 _AXIS: Final = re.compile(r"([qvw]?)([xyzw])")
 _KINDS: Final = ("topics", "services", "actions")  # ends of the graph
@@ -58,7 +58,7 @@ _HOLDS: Final = {
     "feedback": re.compile(r"/[^/]*(feedback|progress)$"),
     "result": re.compile(r"/[^/]*(result|outcome|output|response|parameters)$"),
 }
-#: By state of a goal: beginnings of words for it, and the numbers of action_msgs/msg/GoalStatus.
+#: For each state of a goal: beginnings of words for it, and its numbers in action_msgs/msg/GoalStatus.
 _STATES: Final = {
     "running": r"run|exec|activ|accept|pend|work|cancell?ing|[123]$",
     "succeeded": r"succe|done|compl|finish|4$",
@@ -454,8 +454,8 @@ def _fit(places: dict[str, dict[str, Schema]], definition: Definition, message: 
     """Return how a schema has the fields of a message, where in it it has most; None if it is another message.
 
     Args:
-        places: of the schema.
-        definition: of a type.
+        places: places of the schema.
+        definition: the definition of a type.
         message: a type in it; empty means itself.
     """
     own = dict(_own_leaves(definition, message))

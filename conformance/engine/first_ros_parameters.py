@@ -12,7 +12,7 @@ from urllib.parse import quote, unquote
 from conformance.documents.openapi import Operation
 from conformance.engine.commanded import body_schema
 
-# By node and parameter: its type, and its value.
+# Its type, and its value, by node and parameter.
 Nodes = dict[str, dict[str, tuple[str, Any]]]
 # Parameters that every node has.
 _COMMON: Final = re.compile(r"(use_sim_time|start_type_description_service)$|qos_overrides\.")
@@ -28,7 +28,7 @@ def parameters_of(
 
     Args:
         operations: the description's.
-        nodes: of the live graph.
+        nodes: nodes of the live graph.
         get: reads an operation once, and returns the document.
     """
     for operation in operations:

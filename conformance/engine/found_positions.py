@@ -35,7 +35,7 @@ _FOLLOWS = 0.15  # share of a move by which an axis may miss its target, or move
 _SEEN_S = 1.0
 _SLOW_S = 2.5  # an axis whose move takes this long gets no farther target, s
 _SHARES: Final = (1.0, -1.0, 0.8, -0.8, 0.6, -0.6, 0.5, -0.5)  # of axes that move at once, how far each is sent
-# What a reading has beside a position for its least and its greatest value.
+# Names of members with the least and the greatest value of a position in the same reading.
 _LIMITS: Final = (
     ("limits/0", "limits/1"),
     ("limits/min", "limits/max"),
@@ -121,7 +121,7 @@ class PositionFinder(Finder):
         until = self._clock.now() + _BUDGET_S
         try:
             moved, tried = self._try_axes(numbers, start), set(self._numbers)
-            # What followed beside axes that did not is tried again without them: one may keep another from its place.
+            # If some axes moved and others did not, try the moved ones alone: one axis may block another.
             while 1 < len(moved) < len(tried):
                 tried = set(moved)
                 moved = self._try_axes([self._numbers[name] for name in moved], start)
@@ -171,7 +171,7 @@ class PositionFinder(Finder):
                     name: side * way for name, way in ways.items() if self._has_room(name, start[name] + side * way)
                 }
                 moved = self._move_axes(start, room, ways) if room else None
-                # What stays where it is on one side may stand at an end of its travel.
+                # An axis that moves in one direction only may stand at an end of its travel.
                 lost |= room.keys() - moved.keys() if moved is not None and not self._stood else set()
                 for name, one in (moved or {}).items() if side or found else ():
                     found.setdefault(name, []).append(one)
@@ -361,7 +361,7 @@ class PositionFinder(Finder):
             yield f"within_s = {2.0 + slowest * widest:.1f}  # seen: a part of the way took {slowest:.2f} s"
         off = max(max(2 * move.off, 8 * move.sigma) for move in moved.values())
         yield f"tolerance = {off + 0.01:.3g}  # twice what was seen, and room"
-        # Of limits in words nobody knows whether what is beyond them is refused.
+        # If limits are only in prose, the device need not refuse targets beyond them.
         by_schema = all(self._limits(one) and (bounds_of(one.schema) or not one.bounds) for one in numbers.values())
         yield from self._refusal_lines(declared=by_schema)
         yield from self._stop_lines(1.0, "the suite's")

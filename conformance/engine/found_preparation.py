@@ -31,7 +31,7 @@ _LEASES: Final = frozenset(
 )
 _KEEPS: Final = frozenset({"renew", "heartbeat", "keepalive", "keep", "refresh", "extend"})
 _RELEASES: Final = frozenset({"release", "unlock", "free", "return", "relinquish"})
-# What makes a device ready, with the word for the opposite, in the usual order; an empty word: it has none.
+# Words for operations that make a device ready, in the usual order, with the word for the opposite, if any.
 _READY: Final = {
     "enable": "disable", "arm": "disarm", "activate": "deactivate", "on": "off", "energize": "deenergize", "home": "",
     "homing": "", "calibrate": "",
@@ -42,7 +42,7 @@ _SWITCHES: Final = re.compile(r"enabled?|armed|active|on|power(?:ed)?|motors?", 
 _TOKEN: Final = re.compile(r"token|lease|lock|session|control|(?:^|_)id$|(?:^|_)key$", re.IGNORECASE)
 _NO_LEASE: Final = re.compile(r"authorization|idempotency|request.?id|api.?key|if-match", re.IGNORECASE)
 _LASTS: Final = re.compile(r"ttl|expires?_?in|timeout|duration|valid_for|lifetime", re.IGNORECASE)
-# What a refusal says that wants more than another number.
+# Words of a refusal that demands another operation first, not another number.
 _WANTS: Final = re.compile(
     r"lease|lock|control|session|token|owner|enabl|disabled|arm(?:ed)?\b|motors?\b|power|activ|servo|brake|ready|hom(?:e|ing)",
     re.IGNORECASE,

@@ -252,7 +252,7 @@ class VelocityFinder(Finder):
             for name, given in responses.items()
         }
         turns = {command.name for command in self._plan.numbers if command.turns and own[command.name]}
-        # What two wheels change alike is neither one's own.
+        # A place that changes with both wheels belongs to neither of them.
         shared = {
             name: {place for other, seen in own.items() if other != name for place in given.keys() & seen.keys()}
             for name, given in own.items()
@@ -426,7 +426,7 @@ class VelocityFinder(Finder):
         }
         places |= {place: one for place, one in shown.values() if one.is_position}
         if all(self._turns_with(responses[name]) for name in shown):
-            # What turns with each number stays near: it drives in circles.
+            # If each number turns the device, it drives in circles and stays near.
             places = {place: one for place, one in places.items() if self._looks.is_heading(place)}
         # How fast each place changes at most.
         fastest = {
@@ -518,7 +518,7 @@ class VelocityFinder(Finder):
         if turns and unit in {"rad", "deg"} and not angle and self._looks.is_heading(place):
             angle = "yaw"
         room = _ROOM_RAD * scale if turns else ROOM_M * scale
-        # What turns in a unit that nobody tells may do so in degrees.
+        # A turn in an undeclared unit may be in degrees.
         room = room if turns and (told or is_heading) else max(room, ROOM_S * fastest)
         all_around = [round(end * scale, 1) for end in (-3.0, 3.0)]
         limits = all_around if angle else [round(here - room, 4), round(here + room, 4)]

@@ -138,7 +138,7 @@ def template_of(schema: Schema, names: Mapping[str, str], at: str = "", depth: i
     """Return a body with a template at some places, and values for the other required members.
 
     Args:
-        schema: of the body.
+        schema: the schema of the body.
         names: templates, or values, by JSON pointer.
         at: the pointer of this part.
         depth: so deep at most.

@@ -17,7 +17,7 @@ from conformance.statement.motion_map import MotionMap
 from conformance.verdict.finding import count_of
 from conformance.verdict.verdicts import Value, Verdict
 
-#: By question: the requirements that answer it.
+#: The requirements that answer each question.
 QUESTIONS: Final[dict[str, tuple[str, ...]]] = {
     "Does it move as told?": ("velocity", "reaches", "stays", "last-of-many", "new-target", "one-client"),
     "Does it stop when told?": ("velocity-stop", "stop", "stop-lasts"),

@@ -52,7 +52,7 @@ def moves(failure: Mapping[str, Any], contract: Contract | None = None, base_url
     Args:
         failure: the finding, as in result.json.
         contract: the contract that judged, whose operations may say that a GET moves the robot; None if unknown.
-        base_url: of the robot's REST interface.
+        base_url: the base URL of the robot's REST interface.
 
     Raises:
         ValueError, KeyError, TypeError: the finding is malformed.

@@ -223,7 +223,7 @@ def judged_by_checks(
 
     Args:
         contract: the contract.
-        statement: of the robot.
+        statement: the statement of the robot.
         requirements: ids.
         allow_motion: whether the robot may be moved.
         seed: seed of everything random, as in the recorded run.

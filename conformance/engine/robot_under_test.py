@@ -40,7 +40,7 @@ from conformance.transport.rosbridge import BridgeClient
 from conformance.verdict.finding import Finding
 from conformance.verdict.run import Run
 
-# By kind of operation: the words for its ROS side in messages.
+# Words in messages for the ROS side of each kind of operation.
 _DOES: Final = {
     "topic": "reads", "publishes": "publishes on", "service": "calls", "action": "sends goals to",
     "parameter": "gets or sets", "lists": "lists",
@@ -198,7 +198,7 @@ class RobotUnderTest:
             # A device with a contract has no streams, and counts requests; another device may do otherwise.
             self.connection.endless = self.connection.resends = True
             self.connection.is_away = self._is_away
-        # Where moments count, the scenarios decide when they send again.
+        # If timing matters, the scenarios themselves decide when to send a request again.
         said = self.run.statement
         self.connection.is_patient = not (self.device.is_known or said.motion_map or said.ros_map)
         self.connection.overload.ended = self._end

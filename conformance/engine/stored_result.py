@@ -61,7 +61,7 @@ def judge_stored(robot: RobotUnderTest, result: Mapping[str, Any], folder: Path)
     Args:
         robot: with statement and contract; it is not asked.
         result: the content of result.json.
-        folder: of the result.
+        folder: the folder of the result.
 
     Raises:
         HistoryError, TracesError: one of the files cannot be read, neither is there, or the history is another run's.

@@ -80,7 +80,7 @@ class MemberResult:
 
     Attributes:
         outcome: in a word.
-        exit_code: of its process, negative for a signal; None if it was not started.
+        exit_code: the exit code of its process, negative for a signal; None if it was not started.
         reason: why there is no verdict, or empty.
         seconds: duration, s.
         document: content of its result.json, or None.
@@ -122,7 +122,7 @@ class MemberRun:
     Args:
         member: the robot.
         folder: for its results.
-        options: of `roaas certify`, the same for all robots.
+        options: options of `roaas certify`, the same for all robots.
         time_limit_s: time after which the run is aborted, s.
     """
 

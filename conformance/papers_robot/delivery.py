@@ -26,7 +26,7 @@ class DeliveryFields(NamedTuple):
 MESSAGE_FIELDS: Final = DeliveryFields._fields
 #: Coordinates in metres, in the order of the ROS message and of the REST path.
 COORDINATES: Final = MESSAGE_FIELDS[1:]
-#: What the REST path calls them.
+#: Names of these fields in the REST path.
 PATH_NAMES: Final = ("depot_x", "depot_y", "dest_x", "dest_y", "source_x", "source_y")
 #: All fields in the order of the XSD's sequence, deliveryRequestMessage.
 XSD_FIELDS: Final = ("depot_x", "depot_y", "destination_x", "destination_y", "message_code", "source_x", "source_y")

@@ -159,7 +159,7 @@ def _import_early(interfaces: Interfaces, run: Run) -> Iterator[None]:
 
 
 def _prepare(services: Iterable[SoapService], run: Run) -> None:
-    # What fails here fails again in the check that needs it, and is judged there.
+    # A failure here happens again in the check that needs the value, and is judged there.
     with suppress(Exception):
         for service in services:
             _ = service.description.types, service.contract.types

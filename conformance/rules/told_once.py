@@ -40,7 +40,7 @@ def told_once(
     """Yield a case for each probe that holds, and one for each cause of faults, with its operations.
 
     Args:
-        probes: those that the rule judges.
+        probes: probes that the rule judges.
         expected: what the rule demands, as a noun phrase.
         fault_of: returns what is wrong with a probe, or None.
         apart: whether each operation is a cause of its own.

@@ -25,7 +25,7 @@ from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
 _UNDECIDED: Final = frozenset({404, 409, 410})
 # Statuses by which a device says that there is a new thing, or a job that has begun.
 _MAY_BE_CREATED: Final = frozenset({200, 201, 202})
-# Of a slow device: operations that are sent without credentials on a connection that has carried some.
+# Operations of a slow device that are sent without credentials on a connection that has carried credentials.
 _KEPT: Final = 3
 _NEVER: Final = 97  # number for an identifier that nobody creates
 _ABSENT: Final = "roaas-is-not-there"

@@ -33,7 +33,7 @@ from conformance.verdict.evidence import SENTENCE
 # Filters that are tried.
 _FILTERS: Final = 2
 _ACCEPTED: Final = 202
-# Phrases in a description which say that a number counts what exists now; below, what ever existed.
+# Phrases in a description which say that a number counts what exists now, or what has ever existed.
 _NOW: Final = re.compile(
     r"\b(?:how many|number of)\b[^.]*\b(?:have|has|are|is|currently|now|with|in|on)\b", re.IGNORECASE
 )

@@ -120,7 +120,7 @@ class _Sender:
         There, what the description forbids in this state is tried.
         """
         now = self._read(command.read, whole)
-        # What ends an activity comes last.
+        # Operations that end an activity come last.
         others = sorted(self.known, key=lambda one: bool(words_of(one.operation.template) & ENDING))
         for other in others if command.state is not None else ():
             name, states = command.state or ("", frozenset())

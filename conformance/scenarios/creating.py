@@ -52,7 +52,7 @@ def created_path(
     if made is None or made.exchange is None or not (made.status in statuses or may_create(create, made.status)):
         return ""
     path = location_of(surveyor.api, read, made.exchange)
-    # What is answered 200 may have been there.
+    # With status 200, the thing may have existed before.
     is_new = made.status in statuses or unquote(path.rstrip("/").rpartition("/")[2]) not in known
     return path if is_new else ""
 
@@ -80,7 +80,7 @@ def location_of(api: RestInterface, read: Operation, made: Exchange) -> str:
     if location and is_same(joined(sent, location), sent):
         targets = [path_of(joined(sent, location)).removeprefix(api.client.prefix)]
     if id_ := id_member(read_json(answer.body).value, read)[1]:
-        # What is created below another thing may have a path of its own.
+        # A thing that is created below another one may have a path of its own.
         bases = urlsplit(sent).path.removeprefix(api.client.prefix).rstrip("/"), collection_of(read.template)
         end = f"/{quote(str(id_), safe='')}{'/' if read.template.endswith('/') else ''}"
         targets += [base + end for base in dict.fromkeys(bases) if "{" not in base]

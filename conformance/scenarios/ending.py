@@ -38,7 +38,7 @@ from conformance.transport.exchange import Exchange, NoAnswerError
 
 _BEGINNING = 2  # operations that start an activity
 _KINDS = 3  # kinds of things that are tried
-# Words in names of numbers that tell how long an activity lasts; how much longer it is to last; new things for it.
+# Words in names of numbers for the duration of an activity; factor for it; most things that are created for it.
 _LASTING: Final = frozenset(
     {
         "ms",
@@ -233,7 +233,7 @@ def look_at_ended(api: RestInterface, values: Values, begun: list[Ended]) -> Non
     writer = Writer(api, values)
     for kind in begun:
         ends = [operation for operation in kind.actions if _ends(operation)][:1]
-        # What was cancelled and goes on all the same shows that when it is done.
+        # A cancelled activity that goes on nevertheless shows this when it is done.
         time.sleep(max(0.0, kind.at_s + _GOES_ON_S - time.monotonic()) if kind.paths and ends else 0)
         with suppress(NoAnswerError):
             done = ""
@@ -254,7 +254,7 @@ def _walk(writer: Writer, kind: Ended, path: str, steps: list[Operation]) -> Non
         at = path.rstrip("/") + step.template[len(kind.read.template.rstrip("/")) :]
         sent = writer.send(step, at)
         if sent.response.status == _CONFLICT and waits and _pauses(step):
-            # What has just begun may have to get ready before it can be paused.
+            # A new activity may have to get ready before it can be paused.
             waits = False
             sent = writer.send(step, at) if _is_ready(writer, kind, path) else sent
         told = members(sent, (kind.state,)).get(kind.state) if sent.response.ok else None
@@ -369,7 +369,7 @@ def _delete_used(writer: Writer, operations: _Operations, path: str, delete: Ope
     if at and members(writer.send(reader, at), (name,)).get(name) == body[name]:
         deleted = writer.conditional(delete, read, place)
         user, there = writer.send(reader, at), writer.send(read, place)
-        # What has ended uses nothing any more.
+        # A thing that has ended no longer refers to anything.
         is_over = str(members(user, ("state",)).get(state_of(reader))).casefold() in FINAL
         refers = not is_over and user.response.ok and members(user, (name,)).get(name) == body[name]
         is_lost = deleted.response.ok and refers and there.response.status in ABSENT

@@ -88,7 +88,7 @@ def estimate(run: Run, operations: Sequence[Operation]) -> Estimate:
 
     Args:
         run: the data of the run; its effort knows how fast the device answers, or assumes that it is fast.
-        operations: those that may be called.
+        operations: operations that may be called.
     """
     effort = run.effort
     if SOAP in run.contract.classes:

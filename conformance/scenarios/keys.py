@@ -49,7 +49,7 @@ _FIRST: Final = re.compile(
 _OTHER_BODY: Final = re.compile(
     r"\bkey\b[^.]*\b(?:other|another|different)\b[^.]*\b(?:refuse[sd]?|reject(?:ed|s)?|409|422)\b", re.IGNORECASE
 )
-#: What is special about a key that comes with another body, where the description says that it is refused.
+#: Name of the case in which a key is sent with another body, which the description says is refused.
 REFUSED_BODY: Final = "other body, refused by the description"
 _KEY: Final = re.compile(r"idempoten", re.IGNORECASE)
 UNSPENT: Final = re.compile(

@@ -204,7 +204,7 @@ class Reader:
         listing: the list.
         always: values of query parameters, by name, that each request has.
         by: as in Page.
-        path: of a list below a thing.
+        path: the path of a list below a thing.
     """
 
     api: RestInterface

@@ -31,7 +31,7 @@ _ENDED: Final = frozenset(
     {"done", "finished", "completed", "complete", "ended", "failed", "cancelled", "canceled", "succeeded", "expired"}
 )
 _STATES: Final = ("state", "status", "phase")
-# Members whose text depends on the address of the read; below, texts that are times.
+# Members whose text depends on the URL of the read; texts that begin with a date.
 _PLACES: Final = re.compile(r"(?:url|uri|href|link|links|self|path)$")
 _TIME: Final = re.compile(r"\d{4}-\d\d-\d\d")
 _MANY: Final = 10
@@ -127,7 +127,7 @@ class Thing:
         life: what was done with it.
         last: the last read of it.
         kept: the members that read as they were written.
-        schema: that of the body which wrote them.
+        schema: the schema of the body which wrote them.
         state: whether it is there.
         is_own: whether the run has created it.
         is_told: whether the list was found wrong about it.
@@ -177,10 +177,10 @@ class Living:
     at: str = ""
     _shown: bool = False
     _capped: bool = False
-    # Whether a thing has survived the creation of another. Below: things lost before that was known.
+    # Whether a thing has survived the creation of another.
     _lasts: bool = False
     _is_shown_otherwise: bool = False
-    _replaced: list[Look] = field(default_factory=list)
+    _replaced: list[Look] = field(default_factory=list)  # things that were lost before that was known
 
     @property
     def is_over(self) -> bool:

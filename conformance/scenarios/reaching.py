@@ -39,7 +39,7 @@ class Reaching:
 
     Attributes:
         api: the device.
-        values: those that the run knows.
+        values: values that the run knows.
         wants_tag: operations for which the device asked for a condition.
     """
 

@@ -189,7 +189,7 @@ def _body(done: Write) -> dict[str, Any]:
 
 def _write(writer: Writer, read: Operation, write: Operation, body: Any, before: Exchange) -> list[Write]:
     """Write a value; return it with the reads on the same and on another connection; empty if it is refused."""
-    # What it is a part of, or is part of it, shows the same.
+    # A resource above or below it shows the same values.
     path = read.template.rstrip("/")
     near = [
         one

@@ -113,7 +113,7 @@ class _Changes:
     def write(self, act: Act, declared: Element, node: Node) -> Iterator[None]:
         """Write other values, refused ones, and values in other forms; read each, and restore the first ones."""
         readers = [one for one in self.acts if one[0].shows(act)]
-        # What a list shows of one thing is compared by `soap_things`.
+        # `soap_things` compares the items of lists.
         readers = [one for one in readers if one[0].needs] or readers
         if not readers:
             return
@@ -188,7 +188,7 @@ class _Changes:
         """Write messages without a part, with other numbers of parts, and of derived types; read the result."""
         until = time.monotonic() + _BUDGET_S
         names = {node.at(path).name.lower() for path, _ in free} | act.inherited
-        # What is left out has to keep a value that is not the first one, which a device may go back to.
+        # A value that a message leaves out must stay. Use another value than the first, to which a device may return.
         node = _with_others(node, free, 1) if act.keeps else node
         if act.keeps:
             self.caller.ask(act, node, "a message with other values")
@@ -262,7 +262,7 @@ class _Changes:
             for made in written:
                 self.caller.ask(act, made, "a message for another thing")
                 shown.append(self._is_shown(self._read(readers, made), made, free))
-            # What is not there yet may come later.
+            # The device may write the values later.
             time.sleep(0 if all(shown) else _LATE_S)
             for made in written:
                 self._read(readers, made, times=2)
@@ -358,7 +358,7 @@ class _Changes:
             # A bound is no valid name of an existing thing.
             free = frozenset(act.sent.keys() - asked if act.role is Role.WRITES else ())
             made_of = [*_alternatives(declared, node, free)] if declared and node else []
-            # What is left out of a message that writes is read too (_ends).
+            # Messages that write are sent without a part elsewhere, where the values are read back (_ends).
             made_of += [*_without(declared, node)] if declared and node and act.role is not Role.WRITES else []
             for says, made in made_of:
                 if self.caller.messages.found.types.invalid(parse(made.serialize())):

@@ -52,7 +52,7 @@ class Walk:
     """A walk through the states.
 
     Attributes:
-        states: those of the map.
+        states: states of the map.
         operations: by name, the states in which each must be taken.
         steps: what was sent.
         first: the state at the beginning.

@@ -50,7 +50,7 @@ def read_traces(path: Path, scenarios: Iterable[Scenario], report: Callable[[str
 
     Args:
         path: the file.
-        scenarios: those that are known.
+        scenarios: scenarios that are known.
         report: is called for a trace that is not of its scenario's type, as one of an earlier version may be.
 
     Raises:

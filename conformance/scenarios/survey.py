@@ -525,7 +525,7 @@ def survey(api: RestInterface, values: Values) -> Survey:
         surveyor.try_again(operations)
         surveyor.refuse_again(operations)
         gone = {operation.template for operation in deletes}
-        # Other checks read what is there: a file that was deleted is stored again, and another thing is the usual one.
+        # Other checks read existing things: store a deleted file again, and choose another thing as the usual one.
         stored = [item for item in first if item.method == "PUT" and not collection_of(item.template)]
         for operation in (*stored, *(item for item in first if item.method == "GET")):
             if operation.template in gone and operation.label not in surveyor.given_up:

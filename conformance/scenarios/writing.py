@@ -66,7 +66,7 @@ class Writer:
 
     Attributes:
         api: the device.
-        values: those that the run knows.
+        values: values that the run knows.
     """
 
     api: RestInterface

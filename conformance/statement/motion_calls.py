@@ -51,7 +51,7 @@ def written_out(motion: Any, values: Mapping[str, Sequence[Any]]) -> Any:
 
     Args:
         motion: the table `motion` of a statement, as read.
-        values: of the table `values`.
+        values: values of the table `values`.
     """
     if not isinstance(motion, Mapping):
         return motion

@@ -58,7 +58,7 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         failure: how a 2xx response says that its request failed; None means by no value.
         timeout_s: time that the gateway has for a response, and for what the response stands for, s; None: 5 s, and how
             long it waits for a service that does not respond is not judged.
-        type: of the message, service or action.
+        type: the type of the message, service or action.
     """
 
     type: str = ""
@@ -91,7 +91,7 @@ class Reads(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     Attributes:
         topic: its full name.
-        type: of its messages.
+        type: the type of its messages.
         absent: the statuses without a message: the topic has no publisher or no message, or the last is too old. Empty:
             not judged.
         max_age_s: how old a message may be that the operation returns, s; None means as old as it gets.
@@ -112,7 +112,7 @@ class Publishes(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     Attributes:
         publishes: the topic's full name.
-        type: of its messages.
+        type: the type of its messages.
     """
 
     publishes: Topic
@@ -127,7 +127,7 @@ class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         at: where the word for the state is in the response.
         ended: where the word for the end is in the response of a device that has no goal any more, of any status.
         running, succeeded, aborted, canceled, rejected: these words; an empty list: not judged.
-        body: of the request, a template as well.
+        body: the body of the request, a template as well.
     """
 
     read: Call
@@ -146,7 +146,7 @@ class Calls(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     Attributes:
         service: its full name.
-        type: of the service.
+        type: the type of the service.
         result: where the response of the service is in the response's body, or in that of ``state.read``.
         id: where the call's id is in the response; None means at the end of its Location.
         state: what the call says of itself until it has ended; None if the response to the call is its outcome.
@@ -168,13 +168,13 @@ class Acts(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     Attributes:
         action: its full name.
-        type: of the action.
+        type: the type of the action.
         id: where the goal's id is in the response; None means at the end of its Location.
         state: what the goal says of itself; None if not judged.
         feedback: where the last feedback is in the response of ``state.read``; None means nowhere.
         result: where the result is in the response of ``state.read``; None means nowhere.
         cancel: the operation that cancels the goal, a template: "{id}" is the goal's id.
-        cancel_body: of that request, a template as well.
+        cancel_body: the cancel body of that request, a template as well.
         rejected: the statuses when the action server rejects a goal; empty means any error, or a state that says so.
     """
 
@@ -195,7 +195,7 @@ class Parameter(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
     Attributes:
         parameter: its name.
         node: the node's full name.
-        type: of its value: a name of rcl_interfaces/msg/ParameterType in lower case, without PARAMETER_.
+        type: the type of its value: a name of rcl_interfaces/msg/ParameterType in lower case, without PARAMETER_.
         sets: whether it sets the value; None if its method is not GET.
         refused: the statuses when the node refuses a value; empty means any error.
     """
@@ -233,7 +233,7 @@ class Lists(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 Operation = Reads | Publishes | Calls | Acts | Parameter | Lists
-#: By the key that says so: what an operation is.
+#: The kind of an operation, by the key that declares it.
 KINDS: Final[dict[str, type[Operation]]] = {
     "topic": Reads, "publishes": Publishes, "service": Calls, "action": Acts, "parameter": Parameter, "lists": Lists,
 }  # fmt: skip

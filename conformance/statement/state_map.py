@@ -26,7 +26,7 @@ class Operation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename=
         to: the state to which it leads, or a table of them by the state before; empty if the state stays.
         via: states that may be shown on the way there, in this order.
         within_s: time for that, s; None means that of the map.
-        body: of the request; None if it has none, or the usual message of a WSDL.
+        body: the body of the request; None if it has none, or the usual message of a WSDL.
         refusal: the statuses of a refusal; empty means any that is no success.
     """
 

@@ -56,7 +56,7 @@ def connection_of(where: Endpoints) -> Connection:
         trust=trust,
     )
     if where.auth is not None and where.rest:
-        # What the run permits, counts and judges is not for a login.
+        # A login is neither subject to the run's permission, nor counted, nor judged.
         found.log_in = partial(_logged_in, where.auth, where.rest, found.unheard(recent=deque()))
         found.credentials = Credentials((*found.credentials.items, found.log_in()))
     return found

@@ -208,7 +208,7 @@ def _judge_described(source: str, api: Api | None, statement: Path | None, optio
     soap = is_wsdl(source) or source in {options.wsdl, api.wsdl}
     _check_soap(["soap"] if soap else [])
     try:
-        # Where an API key goes, the description may say, so that it is read without one.
+        # The description may say where the API key goes, so it is fetched without the key.
         connection = connection_of(where if where.api_key else msgspec.structs.replace(where, api_key_file=None))
         more: dict[str, Any] = {
             "mapped": _map_classes(statement, options),

@@ -424,7 +424,7 @@ class Draft:
 
     Attributes:
         client: would have sent it.
-        method: of the request.
+        method: the method of the request.
         octets: the whole request, for a connection of its own.
     """
 

@@ -29,7 +29,7 @@ class Content(NamedTuple):
 def content_of(octets: bytes, encoding: str | None, *, is_whole: bool) -> Content:
     """Return the content of a response that has these octets and this Content-Encoding.
 
-    Content of another coding than gzip and deflate, of more than 32 MiB, of 100 members, or that is a part of one is
+    Content is not decoded if its coding is not gzip or deflate, if it exceeds 32 MiB or 100 members, or if it is cut
     not decoded.
     """
     coding = (encoding or "").strip().lower()

@@ -41,7 +41,7 @@ _STREAMS: Final = ("text/event-stream", "multipart/x-mixed-replace", "video/", "
 _STREAM: Final = 64 * 1024
 _STREAM_S: Final = 1.0
 _DOWNLOAD: Final = 4 * 1024 * 1024
-# Time in which a reset follows data that nobody reads, on a network nearby, ms.
+# Time in which a nearby server that does not read resets the connection, ms.
 _RESET_MS: Final = 50
 _QUICKACK: Final = getattr(socket, "TCP_QUICKACK", None)  # Linux alone has it
 
@@ -131,7 +131,7 @@ class HttpConnection:
             time.monotonic(),
             cut,
         )
-        # What came after the response would be taken for that to the next request.
+        # Bytes after the response would be taken for the response to the next request.
         ends = self._state.our_state is h11.DONE and self._state.their_state is h11.DONE
         if ends and not self._state.trailing_data[0]:
             self._state.start_next_cycle()

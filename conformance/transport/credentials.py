@@ -63,7 +63,7 @@ def _with_another_character(secret: str) -> str:
     return secret[:middle] + ("1" if secret[middle : middle + 1] == "0" else "0") + secret[middle + 1 :]
 
 
-# By name: how a nearly right secret is made from the secret, and what is appended to the secret's variable.
+# Changes that make a nearly right secret, by name, each with the text that is appended to the secret's variable.
 _NEARLY: Final[dict[str, tuple[Callable[[str], str], str]]] = {
     "": (str, ""),
     "lengthened": (lambda secret: f"{secret}-{WRONG}", f"-{WRONG}"),
@@ -83,7 +83,7 @@ class Credential:
     Attributes:
         kind: where it goes.
         secret: the token, the key, the header's value, or ``user:password`` for ``basic`` and ``digest``.
-        name: of the header, the query parameter or the cookie; empty for the others.
+        name: the name of the header, the query parameter or the cookie; empty for the others.
         near: how the sent text differs from the secret, so that no robot knows it; empty if it does not.
     """
 
@@ -207,7 +207,7 @@ class Credentials:
         """Return the headers to add to a request.
 
         Args:
-            method: of the request.
+            method: the method of the request.
             target: its request target.
             given: names of headers that the request has already: they are left as they are.
             shown: with variables in place of the secrets.

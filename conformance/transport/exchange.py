@@ -256,7 +256,7 @@ class NoAnswer(StrEnum):
     GATEWAY_TIMEOUT = "504"
 
 
-#: By status of a gateway: what it says about the absent device behind it (RFC 9110 15.6.3 to 15.6.5).
+#: The kind of missing response that a gateway reports by its status (RFC 9110 15.6.3 to 15.6.5).
 OF_GATEWAY: Final = {502: NoAnswer.BAD_GATEWAY, 503: NoAnswer.UNAVAILABLE, 504: NoAnswer.GATEWAY_TIMEOUT}
 
 

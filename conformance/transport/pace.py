@@ -140,7 +140,7 @@ class Overload:
         """Wait for as long as a response puts a request off; return whether to send it again.
 
         Args:
-            response: of any request.
+            response: the response of any request.
             endpoint: returns what the request is for, as Connection.endpoint_of.
             tries: times that the request was sent.
         """

@@ -91,7 +91,7 @@ def crowd(to: HttpClient, requests: Sequence[Sequence[Outgoing]], timeout_s: flo
 
     Args:
         to: where they are sent.
-        requests: of each client.
+        requests: requests of each client.
         timeout_s: the deadline of each request, s.
     """
     for request in itertools.chain(*requests):
@@ -122,7 +122,7 @@ class _Client:
     """One of several concurrent clients, with connections of its own and without listeners."""
 
     def __init__(self) -> None:
-        # By base URL: the client whose connections are shared, and the client of this thread.
+        # The client whose connections are shared, and the client of this thread, by base URL.
         self._clients: dict[str, tuple[HttpClient, HttpClient]] = {}
 
     def send(self, shared: HttpClient, request: Outgoing, wait: Callable[[], object]) -> Attempt:

@@ -155,8 +155,8 @@ class Subscription(Stream):
     """A connection of its own on which one topic is subscribed to.
 
     Args:
-        client: of the rosbridge.
-        body: of the operation: op, topic and type.
+        client: the client of the rosbridge.
+        body: the body of the operation: op, topic and type.
         timeout_s: until it is open, s.
         throttle_s: the least time between two messages, s; 0 if each message is sent.
     """

@@ -51,7 +51,7 @@ class Accepted(NamedTuple):
 
 #: Begins the reason of a failure that an entry does not accept.
 ENTRY: Final = "its baseline entry"
-# An entry names at most so many operations.
+# Most operations that an entry names.
 _NAMED: Final = 5
 #: The baseline that accepts nothing.
 NOTHING: Final = Accepted()
@@ -119,7 +119,7 @@ def baseline_text(
     """Return a baseline file of the present failures; an older baseline's reasons and dates are kept.
 
     Args:
-        failed: the requirements that fail, each with its operations that do. An entry names few operations: what fails
+        failed: the failed requirements, each with the operations that break it. An entry names few of them: what fails
             at many is a fault of the whole device, of which no run sees all.
         old: entries of the older baseline.
         today: the last day of new entries, so that somebody has to choose a later one.

@@ -81,7 +81,7 @@ def by_cause(
         return weight(finding), not forbids, finding.unsent, finding.among > _FEW, finding.met
 
     findings = [finding for id_ in judged for finding in evidence[id_].findings.values()]
-    # By finding: for each of its causes, the finding that reports the cause.
+    # For each of its causes, the finding that reports the cause, by finding.
     told_by: defaultdict[int, list[Finding]] = defaultdict(list)
     for group in _groups(findings):
         told = min(group, key=first)

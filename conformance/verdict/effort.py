@@ -32,7 +32,7 @@ class Speed:
     Fixed classes keep a run bounded and independent of small differences in time.
 
     Attributes:
-        name: of the class.
+        name: the name of the class.
         up_to_ms: the longest usual response time in the class, ms.
         share: share of a fast robot's cases, 0 to 1.
     """

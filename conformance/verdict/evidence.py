@@ -37,7 +37,7 @@ _NAMED = 3  # operations that this message names
 _REFUSED = 400
 # Numbers and quoted values: the parts of a text that differ between cases of one finding.
 _VALUES = re.compile(r"[-+]?\d[\d.e+-]*|'[^']*'|\"[^\"]*\"")
-# By kind of missing response: what a requirement expected instead.
+# What a requirement expected in place of each kind of missing response.
 _SILENT = {
     NoAnswer.TIMEOUT: "a response within the deadline",
     NoAnswer.CIRCUIT_OPEN: "a response within the deadline",
@@ -171,7 +171,7 @@ class Judge:
         self.judged: Callable[[str, Attempt | None], None] = lambda _requirement, _exchange: None
         self._ledger: Mapping[str, Requirement] = known if isinstance(known, Mapping) else {}
         self._renamed, self._twins = ids_by_alias(self._ledger), twins(self._ledger)
-        # By kind of missing response: the requirement that forbids only that kind.
+        # The requirement that forbids only that kind, by kind of missing response.
         self._on_silence = {one.forbids[0]: id_ for id_, one in self._ledger.items() if len(one.forbids) == 1}
         self._sent: deque[Sent] = deque(maxlen=MAX_SEQUENCE)
         self._findings = 0

@@ -186,7 +186,7 @@ def views(verdicts: Iterable[Verdict], acting: Container[str] = ()) -> dict[str,
     """Return how each class was observed that a ROS probe could judge further.
 
     Args:
-        verdicts: of the run.
+        verdicts: verdicts of the run.
         acting: classes whose requests have effects on ROS that requirements of another class are about: they were seen
             there if what needs an observer was judged in a run with a probe.
     """

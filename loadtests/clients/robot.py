@@ -48,7 +48,7 @@ class Described:
         """Return `number` requests, the sets of values in rotation.
 
         Args:
-            credentials: those that are the same in each request; answers to challenges are added when it is sent.
+            credentials: credentials that are the same in each request; answers to challenges are added when it is sent.
             number: how many.
         """
         good = Declared(self.responses) if self.interface == "rest" else Reply(self.reply)

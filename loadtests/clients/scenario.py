@@ -253,7 +253,7 @@ class Client:
 
         Args:
             operation: method and path template, as in the description.
-            values: of the path's parameters.
+            values: values of the path's parameters.
             how: the further arguments of `request`.
         """
         route, given = self._routes.find(operation), values or {}

@@ -261,7 +261,7 @@ class Connection:
             return None
         return CallError("closed", f"the robot closed the connection after {self._octets} bytes of a response")
 
-    # What llhttp calls.
+    # Callbacks of llhttp.
 
     def on_message_begin(self) -> None:
         """Mark that another message follows a complete response: it belongs neither to it nor to the next request."""

@@ -134,7 +134,7 @@ class Device:
 
         Args:
             named: its description and statement.
-            options: of the command; they win over the statement.
+            options: options of the command; they win over the statement.
 
         Raises:
             SettingsError: the description, the statement or a credential cannot be used.

@@ -224,7 +224,7 @@ class Described:
 
     Attributes:
         named: the descriptions and the statement.
-        options: of the command.
+        options: options of the command.
         devices: the device by its OpenAPI description, by its WSDL, or by both; all of them are stopped at the end.
         others: the device to compare with, likewise; empty if there is none.
     """

@@ -145,7 +145,7 @@ class Watch:
     """Watches a run.
 
     Args:
-        outcome: of the run.
+        outcome: the outcome of the run.
         report_s: how late the counts may be, in seconds.
         progress: where it is said how far the run is.
     """

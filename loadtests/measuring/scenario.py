@@ -248,7 +248,7 @@ class ScenarioSession(Recording):
     Args:
         environment: Locust's.
         robot: the robot, with the operations of its description.
-        operations: those that may be called, in the order in which the plan numbers them.
+        operations: operations that may be called, in the order in which the plan numbers them.
         scenario: the file.
     """
 

@@ -53,7 +53,7 @@ def stream_figures(
         moments_ns: when each came.
         ages_ms: our clock less the stamp, of those with a stamp.
         listened_s: for how long they were waited for.
-        offset: of the robot's clock; None where it is not known, so that the ages are not known either.
+        offset: the offset of the robot's clock; None where it is not known, so that the ages are not known either.
     """
     intervals = np.diff(np.array(moments_ns, dtype=np.float64)) / 1e6
     found: dict[str, Any] = {

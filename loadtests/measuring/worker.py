@@ -267,7 +267,7 @@ def serve(
     Args:
         host: where the master listens.
         port: its port.
-        secrets: those of each robot.
+        secrets: secrets of each robot.
         folder: for what was recorded if the master dies.
         parent: the master's process id, if it started this process.
         scenario: the file of the scenario, if the master runs one.

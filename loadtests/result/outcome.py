@@ -36,7 +36,7 @@ class Outcome:
 
     Attributes:
         robots: the one under load, and the one that it is compared with, if any.
-        findings: of the calls to the robot under load before the run.
+        findings: findings of the calls to the robot under load before the run.
         notes: worth knowing; invalid: reasons why the figures are worthless.
         interrupted: by Ctrl-C; dead_at: when the robot fell silent, in seconds from the plan's start.
         carried: each repeat's plan, and how many seconds of it were carried out.

@@ -345,7 +345,7 @@ def step_operation(operations: tuple[str, ...]) -> int:
     return reads[0] if reads else 0
 
 
-#: In a block, wait for at most so many turns of each operation: a rare operation is not called in every block.
+#: A block waits for at most this many calls of each operation: a rare operation is not called in every block.
 _MOST_TURNS = 4
 
 
@@ -354,7 +354,7 @@ def rotation(offered: Sequence[int], weights: Sequence[int]) -> tuple[int, ...]:
 
     Args:
         offered: the numbers of the operations.
-        weights: of all operations, by number; empty where they are called equally often.
+        weights: weights of all operations, by number; empty where they are called equally often.
     """
     if not weights or not offered:
         return tuple(offered)

@@ -97,7 +97,7 @@ class Output:
     """Where results go.
 
     Attributes:
-        folder: of the result.
+        folder: the folder of the result.
         command: the command line; about: the robot's name, vendor and version. The result repeats them.
         progress: `auto`, `lines` or `none`.
     """

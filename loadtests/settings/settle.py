@@ -244,7 +244,7 @@ def settle(options: CliOptions, statement: RobotStatement, target: Target | None
     """Return the settings of a run: options over statement over defaults.
 
     Args:
-        options: of the command.
+        options: options of the command.
         statement: on the robot.
         target: what is called; by default, the paper's robot.
 

@@ -87,7 +87,7 @@ def invalid_because(
 
     Args:
         figures: on the load generator.
-        counts: of the requests.
+        counts: counts of the requests.
         plan: the plan that the generator had to carry out.
         pacing: the clock that started the requests.
         spoilt: remarks on the generator's machine, which may have made requests late.

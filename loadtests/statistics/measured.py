@@ -38,8 +38,8 @@ class Block(NamedTuple):
     """The records of one operation in one segment.
 
     Attributes:
-        plan: of the repeat, or of this part of it.
-        number: of the segment, over all plans.
+        plan: the plan of the repeat, or of this part of it.
+        number: the number of the segment, over all plans.
         segment: when, and over which interface.
         cell: the recorded times and errors.
     """

@@ -17,7 +17,7 @@ from loadtests.statistics.rounds import lag_correlation, widening
 _NS = 1_000_000_000
 _PHASES = ("duel", "aa")
 WIDTH_S = 1.0
-#: A run is cut into so many parts, and a slope is fitted to their medians. Shorter parts would correlate.
+#: A run is cut into this many parts, and a slope is fitted to their medians. Shorter parts would correlate.
 _PARTS = 20
 _WORTH = 0.2  # a smaller change of the median over the run is not reported
 # Each of this many parts of the run must be slower than the part before (or each quicker), because a busy machine

@@ -120,7 +120,7 @@ class Rounds:
         length: units in each.
         unit_correlation, correlation: from one unit to the next, and from one round to the next; None where there are
             too few.
-        influence: of each round, shape (rounds,).
+        influence: the influence of each round, shape (rounds,).
     """
 
     sample: Sample

@@ -126,7 +126,7 @@ def share_interval(counts: Iterable[tuple[int, int]]) -> Interval | None:
     """Return the 95 % interval of a share; None without requests.
 
     Args:
-        counts: of each block in order of time, how many requests count, of how many.
+        counts: for each block, in order of time: how many requests count, of how many.
     """
     table = np.array([pair for pair in counts if pair[1]], dtype=np.float64).reshape(-1, 2)
     found, total = (float(value) for value in table.sum(axis=0))

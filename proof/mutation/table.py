@@ -161,7 +161,7 @@ def read_rows(path: Path, words: Mapping[str, Mapping[str, Any]]) -> Iterator[Mu
     in the table ``[module.interface.class]``; a fourth part has further attributes of Mutant.
 
     Args:
-        path: of the file.
+        path: the path of the file.
         words: what the changes may name, by module.
 
     Raises:

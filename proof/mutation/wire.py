@@ -120,7 +120,7 @@ def _fields(event: h11.Request | h11.Response) -> list[tuple[str, str]]:
 
 _WAIT_S = 30.0
 _PIECE = 262_144
-# A body longer than this may be refused before all of it has been sent.
+# A robot may refuse a body longer than this before the client has sent all of it.
 _LARGE = 65_536
 _CONTINUE = b"HTTP/1.1 100 Continue\r\n\r\n"
 

@@ -18,7 +18,7 @@ from conformance.commandline.given_files import read_json, read_octets, unzipped
 _FORMAT: Final = "roaas-yardstick/1"
 # A smaller probability rules out chance.
 _NO_CHANCE: Final = 0.05
-# By mutant or good device: the number of runs, and by requirement the runs in which it failed or warned.
+# The number of runs, and by requirement the runs in which it failed or warned, by mutant or good device.
 Table = dict[str, tuple[int, dict[str, int]]]
 
 

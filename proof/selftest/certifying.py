@@ -25,7 +25,7 @@ from conformance.verdict.run import Run
 from proof.selftest.at_once import safe_path
 from proof.selftest.robots import Robot
 
-# What every run imports: loaded once, and inherited by the processes that are forked from there.
+# Modules that every run imports: loaded once, and inherited by forked processes.
 _PRELOADED = ["proof.selftest.preloaded"]
 # Time to stop a mutant at the end of a run, s.
 _STOP_S = 1.0
@@ -181,7 +181,7 @@ def robot_of(job: Job, folder: Path) -> RobotUnderTest:
         allow_motion=contract.is_claimed,
         seed=job.seed,
         effort=Effort(job.effort),
-        # A mutant that cannot be stopped hurts nobody.
+        # A mutant need not be stopped: nothing moves.
         stop_s=_STOP_S,
     )
     if job.enough:

@@ -34,7 +34,7 @@ class Settings:
     """How Schemathesis is run; of these, Specmatic takes the limit of time alone.
 
     Attributes:
-        examples: of each operation and phase.
+        examples: examples of each operation and phase.
         phases: comma-separated.
         limit_s: time after which a run is ended, s.
         operations: method and path of each operation to call; empty means all.
@@ -86,7 +86,7 @@ class Comparison:
     Attributes:
         tool: its name.
         good: its findings on the good device.
-        results: of each mutant.
+        results: results of each mutant.
     """
 
     tool: str

@@ -285,7 +285,7 @@ def controls_of(contract: Contract, seeds: int, *, short: bool, variants: bool) 
         found.cases += [Case(needs.device_in(variant.name), variant) for variant in variants_of(contract)]
         found.cases += [Case(needs.device_in(front.name), front) for front in FRONTS]
         found.cases += [Case(device) for device in there if device.once]
-    # Those on ROS take longest, and come last.
+    # Devices on ROS take longest, and come last.
     seeded = sorted((device for device in there if not device.once), key=lambda device: device.on_ros)
     on_ros = [device for device in seeded if device.on_ros]
     kept = [device for device in seeded if not (short and device in on_ros[1:])]

@@ -142,8 +142,8 @@ def run_unchanged(pool: Pool, effort: str = "quick", seed: int = 0, change: Chan
 
     Args:
         pool: the devices.
-        effort: of the run.
-        seed: of everything random.
+        effort: the effort of the run.
+        seed: the seed of everything random.
         change: what the proxy does; it changes nothing.
     """
     robot, proxy = pool.take()

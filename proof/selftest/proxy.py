@@ -186,7 +186,7 @@ class Proxy:
                 if last:
                     break
         except (OSError, IncompleteMessageError, HangUpError):
-            # The connection is broken, so nobody can be told.
+            # The connection is broken, so no response can be sent.
             pass
         finally:
             robot.close()

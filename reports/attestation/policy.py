@@ -93,7 +93,7 @@ OF_DESCRIBED: Final = Policy(
 )
 
 
-# What a value must be, by the type of its key; other keys are a string.
+# What a value must be, in words, by its type; all other values are strings.
 _WORDS: Final[Mapping[Any, str]] = {
     bool: "true or false",
     Literal[False]: "false, as no policy accepts an interrupted run",

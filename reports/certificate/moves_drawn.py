@@ -95,7 +95,7 @@ class Line:
     """One axis in a picture.
 
     Attributes:
-        name: of the axis.
+        name: the name of the axis.
         points: of the device's way, as an SVG polyline.
         wanted: of the targets, as SVG polylines.
         low, high: the values at the lower and the upper edge.

@@ -117,7 +117,7 @@ def tell_change(old: Path, new: Path, threshold: float, out: Path | None = None)
     click.echo(f"\n{verdict.words}. {on_a_line(verdict.sentence)}")
     if not found.valid:
         return EXIT_INVALID
-    # Where every change is unclear, nothing is known to be as fast as before.
+    # If every change is unclear, no operation is known to be as fast as before.
     judged = any(found.with_verdict(known) for known in ("same", "faster", "slower"))
     return EXIT_SLOWER if found.slower else EXIT_OK if judged else EXIT_INVALID
 

@@ -46,7 +46,7 @@ from reports.pages.untrusted import excerpt, on_a_line, visible
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 _DETAIL = 6000
 _LEVELS = {Outcome.FAILED: "error", Outcome.ERROR: "none", Outcome.ACCEPTED: "warning", Outcome.WARNING: "warning"}
-# By form of a source in the ledger: the web page of the clause.
+# The web page of a clause, by the form of the source in the ledger.
 _PAGES = (
     (r"RFC (\d+) (\d+(?:\.\d+)*)", "https://www.rfc-editor.org/rfc/rfc{0}#section-{1}"),
     (r"RFC (\d+) Appendix ([A-Z])", "https://www.rfc-editor.org/rfc/rfc{0}#appendix-{1}"),

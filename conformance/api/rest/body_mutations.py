@@ -279,7 +279,7 @@ def xml_mutations(value: Any, schema: Schema, root: str) -> list[Mutation[bytes]
 
     Args:
         value: a valid one.
-        schema: of the body.
+        schema: the schema of the body.
         root: name of the root element.
     """
     made = [*_of_document(value, root), *_of_xml_places(value, schema, root)]

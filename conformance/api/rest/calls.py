@@ -116,7 +116,7 @@ def example_call(api: RestInterface, operation: Operation, media_type: str = JSO
     Args:
         api: the robot's REST interface.
         operation: the operation.
-        media_type: of the body, if the operation has one.
+        media_type: the media type of the body, if the operation has one.
 
     Raises:
         HarnessError: the generated request is invalid by the contract.

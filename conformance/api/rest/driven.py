@@ -45,7 +45,7 @@ class Driven(Listener):
         # A stop without a parameter stops everything that moves, if there is no other stop.
         self._stops_all = len(stops) == 1 and not [*_places(stops[0])]
         self._names = {name for stop in stops for names, _, _ in _places(stop) for name in names}
-        # By parameter and value: whether a response has shown that the device accepts the value.
+        # Whether a response has shown that the device accepts the value, by parameter and value.
         self._values: dict[str, dict[Any, bool]] = defaultdict(dict)
         self._refused: dict[str, dict[Any, None]] = defaultdict(dict)
 

@@ -44,7 +44,7 @@ class Inputs:
     Attributes:
         path, query, headers, cookies: values by the parameter's name.
         body: JSON value of the body, bytes to send as they are, or NOTHING.
-        media_type: of the body; empty without one.
+        media_type: the media type of the body; empty without one.
         accept: value of Accept; empty means any format.
     """
 

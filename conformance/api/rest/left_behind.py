@@ -40,7 +40,7 @@ class LeftBehind:
     """Follows the exchanges of a run, and keeps those that changed something for good.
 
     Args:
-        operations: of the description.
+        operations: operations of the description.
         base_url: URL below which they are.
     """
 
@@ -183,7 +183,7 @@ def _send(api: RestInterface, method: str, path: str, was: bytes | None = None) 
 
     Args:
         api: the device's REST interface.
-        method: of the request.
+        method: the method of the request.
         path: below the base URL.
         was: what a read of the thing said; its members that the operation takes are the request's body.
     """

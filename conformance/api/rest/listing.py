@@ -111,9 +111,9 @@ class Listing:
         sort, direction: by which member it is sorted.
         reverses: whether a further parameter may turn the order around.
         filters: the parameters that choose items by a member, by the plain name of both.
-        bounds: those that choose items by the least or greatest value of a member.
+        bounds: parameters that choose items by the least or greatest value of a member.
         search: the parameter whose text chosen items contain, in members that its description names.
-        includes: those that add items in which a boolean member is true, such as `include_archived`, by that member.
+        includes: parameters that add items with a true boolean member, such as `include_archived`, by that member.
     """
 
     operation: Operation

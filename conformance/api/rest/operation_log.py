@@ -149,7 +149,7 @@ class OperationLog(Listener):
 
         Args:
             rules: what may be called.
-            findings: of the run.
+            findings: findings of the run.
             usual_status: status of the last usual request, by operation.
         """
         operations = operations_of(self._contract)

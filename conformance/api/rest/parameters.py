@@ -9,7 +9,7 @@ from conformance.documents.parameters import Parameter
 # Texts that are no number by the contract: letters, nothing, and texts that programming languages read as numbers.
 _NO_NUMBERS = ("abc", "roaas-no-number", "", "NaN", "Infinity", "-Infinity", "inf", "1e400", "-1e400", "1.5m", "0x1F")
 _NO_INTEGERS = ("3.5", "99999999999999999999")
-# Of these texts, those that a problem's `detail` can quote recognisably.
+# Those of these texts that can be recognised when a problem's `detail` quotes them.
 _TELLING = {"abc", "roaas-no-number", "1.5m"}
 
 
@@ -18,7 +18,7 @@ class Wrong:
     """An invalid text for a parameter.
 
     Attributes:
-        name: of the parameter.
+        name: the name of the parameter.
         text: what to send.
         what: what is wrong with it.
     """

@@ -50,7 +50,7 @@ def collections_of(operations: Iterable[Operation]) -> frozenset[str]:
         numbers = {one.name for one in item.parameter("path") if kinds_of(one.schema) == {"integer"}}
         for end in re.finditer(r"/\{([^{}]+)\}", path):
             above = path[: end.start()]
-            # Below a thing, whole numbers that nobody lists may be the places of an array.
+            # In a path below a thing, a whole number that no list contains may be an index into an array.
             if "{" not in above or above in known or end[1] not in numbers:
                 names.add(above.rpartition("/")[2])
     return frozenset(singular(name) for name in names if name and not name.endswith("}"))

@@ -113,7 +113,7 @@ def need_of(operation: Operation, status: int) -> tuple[str, list[str]]:
 
     Args:
         operation: it never answered 2xx.
-        status: that of its usual request.
+        status: the status of its usual request.
     """
     need = _OF_STATUS.get(status, "")
     in_path = [item.name for item in operation.parameter("path")]

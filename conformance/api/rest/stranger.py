@@ -43,7 +43,7 @@ class Stranger:
         """Send a request with wrong credentials; return None, without sending it, if the device has shut the suite out.
 
         Args:
-            method: of the request.
+            method: the method of the request.
             path: its target below the base URL.
             options: as of HttpClient.send().
 

@@ -71,7 +71,7 @@ _PASSES: Final = re.compile(
 _SHARED: Final = re.compile(r"(?:default|primary|active|selected|current|order|index|rank|priority|position|sequence)$")
 # Formats whose values are equal regardless of case and punctuation.
 _COMPARED: Final = frozenset({"", "email", "uuid", "hostname", "date", "date-time"})
-# Of a text with one of these, the description says how long it may be: a device that shortens it does not keep that.
+# A text with one of these keywords has a declared length, so a device must not shorten it.
 _BOUNDED: Final = frozenset({"pattern", "maxLength"})
 # Identifiers that the suite chooses where the client may choose them.
 _CHOSEN: Final = ("roaas-{}", "roaas{}", "3fa85f64-5717-4562-b3fc-2c963f66af{:02}")
@@ -355,7 +355,7 @@ def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, 
         sent: the members that were sent.
         answer: those in the response.
         before: those that were read before; empty if nobody read them, or nothing was there.
-        schema: of what was sent.
+        schema: the schema of what was sent.
     """
     parts = flat(schema).get("properties", {})
     told = {
@@ -518,7 +518,7 @@ def left_out_of(
 
     Args:
         parts: schemas of the members of the body.
-        shape: that of the response.
+        shape: the shape of the response.
         bodies: what was sent, what was there before, and what is there now.
         above: path of what is read, with a dot.
     """

@@ -77,9 +77,9 @@ class Unique:
         """Return a body with new values in place of those that were sent before; a change has always the same new ones.
 
         Args:
-            operation: that it is for.
+            operation: the operation that needs it.
             body: as JSON.
-            schema: of it.
+            schema: the schema of the member.
             keep: a member whose value has to stay.
         """
         collection = _collection(operation)

@@ -48,7 +48,7 @@ class Values:
         self._given = {plain_name(name): list(values) for name, values in (given or {}).items()}
         self._seen: dict[str, list[Any]] = defaultdict(list)
         self._ids: dict[str, list[Any]] = defaultdict(list)
-        # By collection: ids of what was deleted, and of what the run has created, the newest first.
+        # Ids of what was deleted, and of what the run has created, the newest first, by collection.
         self._gone: dict[str, set[str]] = defaultdict(set)
         self._made: dict[str, list[Any]] = defaultdict(list)
 

@@ -144,7 +144,7 @@ def together(operation: Operation, usual: Inputs, variations: list[Variation]) -
 
     Args:
         operation: takes JSON.
-        usual: of it.
+        usual: its usual request.
         variations: valid requests; what differs in no member, or is valid only alone, stays a request of its own.
     """
     alone, groups = list[Variation](), list[tuple[Any, list[Variation]]]()

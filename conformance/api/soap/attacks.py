@@ -32,7 +32,7 @@ class Attack:
     """One hostile document.
 
     Attributes:
-        name: of the requirement, in class xml-security.
+        name: the name of the requirement, in class xml-security.
         what: in a few words.
         body: octets.
         must_refuse: whether taking it is a breach. Where not, only what becomes of it counts.

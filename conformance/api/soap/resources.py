@@ -123,7 +123,7 @@ class Resources:
     Args:
         contract: the pack with the WSDL.
         found: what the WSDL describes.
-        branch: of each choice in a request, in rotation; None means all of them, as optional.
+        branch: the branch of each choice in a request, in rotation; None means all of them, as optional.
     """
 
     def __init__(self, contract: Contract, found: Wsdl, branch: int | None = None) -> None:
@@ -253,7 +253,7 @@ class Resources:
         called = matching(self.contract, sent.method, sent.url.removeprefix(BASE).partition("?")[0])
         expected, observed = self._text_in_soap(found.expected), self._text_in_soap(found.observed)
         subject = called.id if called is not None else ""
-        # What was read as it was written is no limit.
+        # If the value was once read as it was written, the device does not limit it.
         is_limit = _NUMBER.fullmatch(observed) and "as it was read before" not in expected
         doubt = found.doubt or ("a device may limit a number" if is_limit else "")
         doubt = doubt or ("it may have several forms" if _FORMS.fullmatch(observed) else "")

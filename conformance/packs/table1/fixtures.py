@@ -55,7 +55,7 @@ _EVERY: Final = 2
 _AGAIN_S: Final = 0.3
 # Distance from the robot's first place to the goals of plans, m.
 _AWAY_M: Final = 0.5
-#: By beat: what it reads, as JSON or XML paths and SOAP operations.
+#: What each beat reads, as JSON or XML paths and SOAP operations.
 _BEATS: Final = (
     (GOAL_PATH, "GetGoal", GOAL_PATH),
     (GOAL_PATH, f"{XML} {GOAL_PATH}", GOAL_PATH),

@@ -32,7 +32,7 @@ _BODILESS = frozenset({204, 205, 304})
 _ON = (survey, held_operations, generated_requests, neighbours, own_things, others)
 # Statuses that any server may send unless the request was the operation's usual one.
 _OF_REQUEST = frozenset({405, 406, 415, 501})
-# Of these statuses, those that the application sends, in the media type that it declares for them.
+# Those of these statuses that the application sends, in the media type that it declares for them.
 _OF_APPLICATION = frozenset({412, 415, 428})
 # Statuses by which a device says that it does not know what a request refers to.
 _NO_SUCH_THING = frozenset({400, 404, 409, 422})

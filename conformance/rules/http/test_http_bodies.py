@@ -46,7 +46,7 @@ _CHUNK_FORMS = (
 # How long a client waits for 100 Continue before it sends its content all the same, s.
 _WAITS_S = 2.0
 _TOO_LARGE = LIMIT_OCTETS + 1
-# The header field that tells how the content is framed, beside Content-Length.
+# Headers that frame the content, besides Content-Length.
 _FRAMINGS: tuple[Headers, ...] = ((), (("Transfer-Encoding", "chunked"),))
 
 

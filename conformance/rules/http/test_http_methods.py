@@ -109,7 +109,7 @@ def test_options(api: RestInterface, judge: Judge) -> None:
         exchange = call.send(api, method="OPTIONS")
         if expect(judge, "http/options", exchange).status(200, 204):
             expect(judge, "http/options", exchange).header("Allow")
-    # What is still there now, was there when it was asked (checkers.resources).
+    # A resource that exists now also existed at the earlier request (checkers.resources).
     for call in [call for call in api.working.values() if call.operation.method == "GET"]:
         if call.operation.parameter("path") and call.operation.label not in api.streams:
             call.send(api)

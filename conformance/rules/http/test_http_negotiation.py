@@ -10,7 +10,7 @@ from conformance.transport.exchange import Outgoing
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
-# Formats that no robot has beside those of the contract.
+# Formats that no robot offers.
 _NOTHING = ("image/png", "application/vnd.roaas-nobody-has-this", "audio/*;q=0.5, video/*")
 
 

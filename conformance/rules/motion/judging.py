@@ -62,7 +62,7 @@ def judge_goal(leg: Leg, goal: Command, motion: MotionMap) -> Iterator[Outcome]:
         )
         return
     seen = usable(leg)
-    # What it shows when its time is over counts, or, where it was there before, what it showed last.
+    # The readings at the end of its time count; if it arrived earlier, the last readings.
     late = tuple(reading for reading in seen if reading.sent >= leg.due)[:SEVERAL]
     last = late if len(late) == SEVERAL else seen[-SEVERAL:]
     apart = off(at(last, motion), goal.targets, motion) if len(last) == SEVERAL else ""
@@ -86,7 +86,7 @@ def follows(drives: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether the device drove as commanded; a drive that a slow link broke off is repeated."""
     seen = [reading for drive in drives for reading in (*drive.under_way, *drive.after)]
     for tries in tries_of(drives):
-        # What was refused counts each time.
+        # Each refused move counts.
         shown = [
             one
             for one in tries

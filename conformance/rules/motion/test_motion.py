@@ -21,11 +21,11 @@ from conformance.verdict.evidence import Case
 
 # Time between two readings that shows a speed, s.
 _APART_S = 0.15
-# Time of a drive that tells one axis from another, s.
+# Duration of a drive that shows which axis moves, s.
 _TOLD_S = 0.3
 # Multiple of the declared speed that counts as faster: it cannot be measured more exactly from outside.
 _FASTER = 1.1
-# After the time to rest: for so long a device that still moves has not stopped in time; later it has set out again, s.
+# A device that moves up to this long after it must rest has stopped too late; later, it has started again, s.
 _SOON_S = 0.5
 # Share of the time that the rest of a way takes by the speed so far.
 _SURELY = 0.7
@@ -277,7 +277,7 @@ def _of_one_driver(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
     seen = [reading for reading in drive.under_way if begin <= reading.sent and reading.received <= end]
     found = {name: speed_in(seen, name, motion) for name in motion.velocity.axes}
     lasted_s = seen[-1].sent - seen[0].sent if seen else 0.0
-    # By positions a velocity is seen in a while only: their noise moves a short one.
+    # Their noise moves a short one, by positions a velocity is seen in a while only.
     brief = {name for name, axis in motion.velocity.axes.items() if axis.of and lasted_s < _TOLD_S}
     speeds = {name: speed for name, speed in found.items() if speed is not None and name not in brief}
     if len(speeds) < len(found):
@@ -285,7 +285,7 @@ def _of_one_driver(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
         return
     fastest_of = {name: max(abs(command.targets[name]) for command in drive.commands) for name in speeds}
     fits = any(
-        # Nearer to its velocity, or to rest, than to another client's; of an axis that nobody drives nothing is told.
+        # Nearer to its own velocity, or to rest, than to another client's. An axis that no client drives shows nothing.
         all(abs(speeds[name] - command.targets[name]) < most / 2 for name, most in fastest_of.items() if most)
         for command in accepted
     )

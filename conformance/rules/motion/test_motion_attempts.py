@@ -104,7 +104,7 @@ def refused_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
     together = _movement(trace, motion)
     alone = trace.idle is not None and not any(_movement(quiet, motion) for quiet in trace.alone)
     if together and alone and not _moves_anyway(trace, motion):
-        # It moves now and then, or after several of them; which one it was, nobody can say.
+        # It moves rarely, or only after several attempts, so no single attempt can be named.
         last = next((attempt.exchange for attempt in reversed(trace.tried) if attempt.exchange is not None), None)
         yield Case(False, last, f"rest after {len(trace.tried)} attempts in a row", observed=together, cause="together")
 

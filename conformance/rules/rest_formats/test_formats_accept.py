@@ -91,7 +91,7 @@ def test_preferred_format(api: RestInterface, judge: Judge) -> None:
     # At little effort each line of the matrix is tried with one resource, another one for each line.
     once = [(calls[index % len(calls)], *_MATRIX[index]) for index in range(len(_MATRIX))] if calls else []
     chosen = few + once + api.run.effort.draw(cases, len(cases), f"{api.run.seed}/accept")
-    # What has one format whatever is asked for has nothing to choose.
+    # A resource with a single format has no choice.
     preferred = [each for one in others for each in alone[id(one)] if each.holds]
     try:
         for call, id_, text in chosen:

@@ -21,7 +21,7 @@ from conformance.verdict.evidence import Case
 from conformance.verdict.finding import Showing
 
 _ON = (survey, generated_requests, neighbours, own_things)
-# A response time grows if the median of the last requests is above that of the first ones; so many each.
+# The response time grows if the median of the last _FEWEST requests exceeds that of the first _FEWEST.
 _FEWEST = 15
 # A body this many times as long may take longer.
 _MORE = 1.5

@@ -19,7 +19,7 @@ class Request(Generic[_Sent]):
 
     Attributes:
         sent: the request as its trace has it.
-        key: of the message; equal for messages that cannot be told apart.
+        key: the key of the message; equal for messages that cannot be told apart.
         accepted: whether it was accepted; None if the response does not show it, so its message may come.
         client: who sent it: the requests of one client have an order.
     """

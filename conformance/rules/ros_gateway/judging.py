@@ -19,7 +19,7 @@ def differing(exchange: Exchange, value: str, definition: Definition, body: Body
     Args:
         exchange: with the response.
         value: JSON of the message.
-        definition: of its type.
+        definition: the definition of its type.
         body: how the operation writes messages.
         at: where the part is.
         ros: how the gateway writes values.

@@ -116,7 +116,7 @@ def others(trace: Services) -> Iterator[Outcome]:
     """Judge whether other resources respond while a call has no response; each must be held up in all rounds."""
     rounds: dict[str, list[Called]] = {}
     for one in trace.probes:
-        # A call that reaches nobody, and is not answered, finds a gateway that an earlier one has stopped for good.
+        # If a call reaches no service and gets no response, an earlier call has stopped the gateway for good.
         is_dead = one.operation in rounds and not isinstance(one.attempt, Exchange)
         if one.server is Server.SILENT and (one.heard or is_dead):
             rounds.setdefault(one.operation, []).append(one)

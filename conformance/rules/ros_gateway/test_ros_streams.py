@@ -22,7 +22,7 @@ def stream_once(trace: tuple[Streamed, ...]) -> Iterator[Outcome]:
         cause = f"{event.operation} once"
         missing = [place for place in range(len(event.sent)) if place not in places]
         if event.known:
-            # Whether it sends what came meanwhile, and how much of that, is open.
+            # The gateway may send all, some or none of the messages of that time.
             again = [place for place in places if 0 <= place < event.known]
             expected = f"no message on {event.body.topic} that the client has had ({event.how})"
             yield Case(not again, event.opened, expected, f"message {_list(again)} again", f"{event.operation} again")

@@ -31,7 +31,7 @@ from conformance.verdict.evidence import Case
 _ROWS: Final = 4
 # Characters of a message that a finding shows.
 _SHOWN: Final = 200
-#: What the link and a busy machine take on top of what the map says, s.
+#: Time for the link and for a busy machine, added to the times of the map, s.
 SLACK_S: Final = 1.0
 
 

@@ -203,7 +203,7 @@ def _wrong_fault_11(found: etree._Element) -> str:
         return f"the child {strange[0]} without a namespace, which SOAP 1.1 does not have"
     if undeclared := _no_prefix(by_name["faultcode"]):
         return undeclared
-    # Other names in SOAP's namespace are allowed: 4.4 recommends it for codes of one's own.
+    # Other names in SOAP's namespace are allowed: SOAP 1.1 4.4 recommends this for an application's own codes.
     space, name = _code_of(found)
     is_other = space == ENVELOPE and name in {"Sender", "Receiver"}
     return f"the code {name!r}, which is one of SOAP 1.2" if is_other else ""

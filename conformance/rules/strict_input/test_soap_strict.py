@@ -60,7 +60,7 @@ def test_single_mutations(soap: SoapServices, judge: Judge, effort: Effort) -> N
     for service in services:
         found = [mutant for declared, message in _targets(soap, service) for mutant in mutations(declared, message)]
         chance.shuffle(found)
-        # Of each kind alike, so that the many ways to miswrite a number do not crowd out the rest.
+        # Equally many of each kind: otherwise most cases would be wrong forms of numbers.
         for kind in _KINDS:
             ours = [mutant for mutant in found if mutant.kind == kind]
             for mutant in invalid_ones(ours[: effort.cases(60)], service.contract.types):

@@ -69,7 +69,7 @@ def tried_at_rest(
     quiet = _quiet(mapped, several, settle, effect_s, beside)
     if not _has_moved(mapped, quiet):
         return quiet
-    # What a device refuses seldom moves it: most attempts are cleared together.
+    # Refused requests rarely move a device, so most attempts are watched together.
     alone, left = list[Quiet](), list(filter(None, (several[:-1], several[-1:])))
     try:
         while left:

@@ -31,7 +31,7 @@ class Binding(Protocol):
     """One way to call a device.
 
     Attributes:
-        syntax: that of its messages.
+        syntax: the syntax of its messages.
     """
 
     syntax: str

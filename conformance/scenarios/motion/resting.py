@@ -14,7 +14,7 @@ from conformance.statement.motion_map import MotionMap
 CREEPS_S: Final = 1.0
 # Time in which a device that has rested is seen to creep, s.
 _SETS_OUT_S: Final = 0.6
-# By default, how fast a device may seem to move at rest: these shares of its tolerance of speed, and of position.
+# These shares of its tolerance of speed, and of position, by default, how fast a device may seem to move at rest.
 _OF_SPEED: Final = 0.1
 _OF_POSITION: Final = 0.2
 _Rate = Callable[[Sequence[Sample]], float | None]

@@ -52,7 +52,7 @@ class Room:
         self._motion = motion
         self._axes = {name: axis for name, axis in motion.state.axes.items() if not axis.angle}
         speeds = motion.velocity.axes if motion.velocity else {}
-        # By velocity and axis: least and greatest change per second at velocity 1.
+        # Least and greatest change per second at velocity 1, by velocity and axis.
         self._rates: dict[str, dict[str, Span]] = {
             name: {speed.of: (speed.scale, speed.scale)} if speed.of else {} for name, speed in speeds.items()
         }

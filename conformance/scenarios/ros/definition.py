@@ -10,7 +10,7 @@ from typing import Any, Final
 
 _ARRAY: Final = re.compile(r"sequence<(?P<items>.+?)(?:, (?P<most>\d+))?>|(?P<item>.+)\[(?P<count>\d+)\]")
 _TEXT: Final = re.compile(r"w?string(?:<(\d+)>)?")
-#: By integer type: least and greatest value.
+#: Least and greatest value of each integer type.
 INTEGERS: Final[dict[str, tuple[int, int]]] = {
     **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
     **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},

@@ -39,7 +39,7 @@ _DISCOVERY_S: Final = 15.0
 #: How long the suite listens whether another robot publishes, s.
 _ALONE_S: Final = 1.2
 _KEYS: Final[dict[type, str]] = {kind: name for name, kind in KINDS.items()}
-#: What of a type an operation is sent.
+#: The part of a type that a request contains.
 _PARTS: Final[dict[type, str]] = {Calls: "#Request", Acts: "#Goal"}
 
 
@@ -121,13 +121,13 @@ class Gateway:
             ProbeError: somebody does.
         """
         ends = [] if not self.plays or self._is_alone else self.ros.operations.values()
-        # What the gateway publishes, it may repeat by itself, as a watchdog does.
+        # The gateway may repeat its own messages, as a watchdog does.
         own = {one.publishes for one in ends if isinstance(one, Publishes)}
         types = {one.topic: one.type for one in ends if isinstance(one, Reads) and one.topic not in own}
         with ExitStack() as listening:
             for topic, type_ in types.items():
                 listening.enter_context(robot.publishing(topic))
-                # That a type is not installed is told where it is needed.
+                # A missing type is reported where it is needed.
                 with suppress(ProbeError):
                     robot.tell("listen", topic=topic, type=type_)
             began = WALL_CLOCK.now()

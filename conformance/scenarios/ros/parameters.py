@@ -23,7 +23,7 @@ from conformance.statement.ros_map import Parameter, is_setter
 from conformance.transport.exchange import Exchange, Outgoing
 from conformance.verdict.effort import Effort
 
-# By the type of an item: its name in a message.
+# Names in a message for the types of items.
 _ITEMS: Final = {"bool": "boolean", "integer": "int64", "double": "double", "string": "string", "byte": "octet"}
 _SAMPLES: Final = {"quick": 6, "standard": 12, "deep": 30}
 # Time in which surplus requests arrive, s.

@@ -265,7 +265,7 @@ class Listed:
     exchange: Exchange
 
 
-# By what is listed: the type of what is put on the graph; nodes have none.
+# Types of the topics, services and actions that the suite adds to the graph, by what the operation lists.
 _KINDS: Final = {
     "topics": "std_msgs/msg/ColorRGBA",
     "services": "std_srvs/srv/Trigger",

@@ -53,8 +53,8 @@ class Robot(RosProcess):
     """A started node.
 
     Args:
-        domain_id: of the graph.
-        name: of the node; each process has another one.
+        domain_id: the domain id of the graph.
+        name: the name of the node; each process has another one.
 
     Raises:
         ProbeError: the process cannot be started.

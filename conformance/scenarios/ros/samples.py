@@ -58,7 +58,7 @@ class Sample:
     Attributes:
         what: as a noun phrase.
         kind: what it is for.
-        value: of the message.
+        value: the value of the message.
     """
 
     what: str
@@ -71,8 +71,8 @@ class Maker:
     """Makes messages of one type.
 
     Attributes:
-        definition: of the type.
-        seed: of what is random.
+        definition: the definition of the type.
+        seed: the seed of what is random.
         is_xml: whether strings have to be such as XML can write and keep.
         is_gentle: whether usual values are small, for a real robot, or a gateway that refuses greater ones.
     """

@@ -21,7 +21,7 @@ from conformance.transport.rosbridge import Subscription
 from conformance.transport.streams import Message, Stream
 from conformance.verdict.effort import Effort
 
-# So many messages in a row, and so long after each, s: no more than a subscription with ROS's default depth of 10 keeps
+# Messages in a row, and pause after each, s: no more than a subscription with ROS's default depth of 10 keeps
 # while its process waits for a processor.
 _IN_A_ROW: Final = 8
 _GAP_S: Final = 0.02
@@ -42,7 +42,7 @@ class Streamed:
     """Messages in a row on a topic, and what came of them over one stream.
 
     Attributes:
-        operation: of the map.
+        operation: the operation of the map.
         body: its map.
         how: as a noun phrase.
         sent: JSON of each message, in the order of publishing.

@@ -49,7 +49,7 @@ _SURE_S: Final = 0.4
 _GIVES_UP: Final = 2
 # Time in which surplus messages arrive, s.
 _MORE_S: Final = 0.5
-# A watchdog has spoken when nothing came for so long; a topic that is never silent is given up then, s.
+# A watchdog's messages have ended after this silence, s. A topic that has none is given up after _SILENT_S, s.
 _SILENCE_S: Final = 2.0
 _SILENT_S: Final = 10.0
 # A publisher may keep no more messages than that, and need not wait for who is slow.
@@ -115,7 +115,7 @@ def topic_reads(gateway: Gateway, effort: Effort) -> Topics:
             older = [json.loads(one.value) for one in shown if one.topic == reads.topic]
             with gateway.robot.publishing(reads.topic):
                 shown.extend(_Reader(gateway, call, reads, definitions[call], older).publish_samples(effort))
-    # What another robot published meanwhile tells nothing of the gateway.
+    # Messages of another robot say nothing about the gateway.
     gateway.check_alone()
     return Topics(tuple(shown), definitions)
 
@@ -296,7 +296,7 @@ class _Writer:
             self.reliable = not robot.tell("listen", topic=topic, type=self.body.type)["best_effort"]
             one = self.send(self.maker.usual())
             if robot.take_heard(topic, 1, 1.0):
-                # Those that were sent before may come late.
+                # Earlier messages may arrive late.
                 clock.sleep(_MORE_S)
                 robot.take_heard(topic)
                 return
@@ -376,7 +376,7 @@ class _Writer:
         robot, ends = self.gateway.robot, (self.body.publishes, "publishers")
         before = robot.count(*ends)
         for _ in range(times):
-            # What comes later than that counts in the next burst as well.
+            # Later messages count in the next burst.
             yield self.burst(1, _BURST, f"{_BURST} messages in a row", more_s=0.0)
             crowded = self.burst(MOST_CLIENTS, 1, f"messages of {MOST_CLIENTS} clients at once")
             # A publisher that leaves late leaves all the same.
@@ -385,7 +385,7 @@ class _Writer:
                 WALL_CLOCK.sleep(PACE_S)
             yield replace(crowded, more=more)
         if many:
-            # A publisher with ROS's usual depth of 10 may lose some of so many.
+            # A publisher with ROS's usual depth of 10 may lose some of these messages.
             yield replace(self.burst(CROWD, _OF_EACH, f"messages of {CROWD} clients at once"), reliable=False)
 
     def burst(self, clients: int, each: int, how: str, more_s: float = _MORE_S) -> Burst:

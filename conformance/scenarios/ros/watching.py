@@ -39,7 +39,7 @@ class Watched:
     Attributes:
         operation: the operation.
         topic: its topic.
-        definition: of its type.
+        definition: the definition of its type.
         looks: in order.
         heard: its messages, in order, from so long before the first look that none need be older.
         reliable: whether no message is lost on the way to the suite.
@@ -100,6 +100,6 @@ def _listen(robot: Robot, reads: Reads) -> tuple[list[Heard], bool]:
         best_effort = robot.tell("listen", topic=reads.topic, type=reads.type)["best_effort"]
         if heard := robot.take_heard(reads.topic, 1, reads.within_s):
             return heard, not best_effort
-        # Publishers that were found meanwhile may be of best effort, which a reliable subscriber does not hear.
+        # New publishers may be best effort, and a reliable subscriber does not receive their messages.
         robot.tell("forget", name=reads.topic)
     return [], False

@@ -30,7 +30,7 @@ _SHOWN: Final = 80
 #: A request that fails after more than _SOON_MS may have timed out on a busy machine: it is sent up to TRIES times.
 _SOON_MS, TRIES = 1000.0, 3
 _UUID: Final = 16
-#: What non-finite numbers are as strings: in JSON by the map, in XML by XML Schema (3.2.5).
+#: Non-finite numbers as strings: in JSON if the map says so, in XML by XML Schema (3.2.5).
 _NAMES: Final = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf, "INF": math.inf, "-INF": -math.inf}
 _NUMBER: Final = re.compile(r"\s*[-+]?[0-9.]+([eE][-+]?[0-9]+)?\s*")
 _MISSING: Final = object()
@@ -197,8 +197,8 @@ def differing(
 
     Args:
         document: that has the web's message.
-        value: of the ROS message, with all fields.
-        definition: of its type.
+        value: the value of the ROS message, with all fields.
+        definition: the definition of its type.
         body: how the operation writes it.
         ros: how the gateway writes values.
     """

@@ -92,7 +92,7 @@ _NULL = next(operator for operator in OPERATORS if operator.name == "null")
 # Changes of whole responses that strike now and then.
 _WHOLE = {"crossed": responses.cross_responses, "failing": responses.failing, "cut": responses.cut}
 _UNSAFE = ("PUT", "POST", "PATCH", "DELETE")
-#: What norms leave open, whatever the contract.
+#: Changes that no norm forbids, whatever the contract says.
 BY_NORM = (
     OpenPlace(
         r"body-bom:[^:]+:body:xml",

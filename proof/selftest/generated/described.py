@@ -32,7 +32,7 @@ _MORE = {
     "body-invalid-utf8": lambda body: body.replace(b'"', b'"\xe9', 1) if b'"' in body else body,
     "body-null": lambda _: b"null",
 }
-# By the last part of a mutant's name: the responses that it alters.
+# The responses that a mutant alters, by the last part of its name.
 _KINDS = {"answer": _SUCCESS, "error": _ERRORS}
 
 

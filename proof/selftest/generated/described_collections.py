@@ -35,7 +35,7 @@ class Input:
     Attributes:
         where: path, query or body.
         steps: its name, after those of the objects that hold it.
-        schema: of its value, flattened.
+        schema: the schema of its value, flattened.
         required: whether requests must have it.
     """
 
@@ -144,7 +144,7 @@ _RIGHT = 10  # number of right lists, after which the mutant's total is always w
 _DEPTH = 2  # depth of nested members
 _Differs = Callable[[Page, Page], bool]
 _SUCCESS, _REFUSED, _NO_TYPE = range(200, 300), range(400, 500), 415
-# What a mutant does with a request to an item. Arguments: request, response, another item, and a way to the device.
+# Function by which a mutant handles a request to an item, from request, response, another item and a way to the device.
 _Act = Callable[[Request, Response, str, Forward], Response | None]
 
 

@@ -179,7 +179,7 @@ def _failing(_request: Request, answer: Response) -> Response | None:
     return altered
 
 
-# By name: the change of successful responses, with the clause that it breaks.
+# Changes of successful responses by name, each with the clause that it breaks.
 _ANSWERS: dict[str, tuple[str, Alter]] = {
     "no-type": (
         "sends no Content-Type (RFC 9110 8.3)",

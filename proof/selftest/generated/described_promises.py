@@ -41,7 +41,7 @@ class _Past:
     keyed: dict[str, tuple[Request, Response]] = field(default_factory=dict)
 
 
-# What a mutant does with a request. Returns the client's response, and whether it was altered.
+# Function by which a mutant handles a request. Returns the client's response, and whether it was altered.
 _Act = Callable[[Request, Forward, _Past], tuple[Response, bool]]
 
 

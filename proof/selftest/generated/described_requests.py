@@ -108,7 +108,7 @@ def _mutant(
     return GeneratedMutant.of(operator, exchange, item.label, f"{exchange.name} {says} {item.label}.", make)
 
 
-# By name of a mutant: the keywords that it ignores. A format is only a remark (JSON Schema 2020-12, Validation 7.2.1).
+# The keywords that each mutant ignores. A format is only a remark (JSON Schema 2020-12, Validation 7.2.1).
 _LOOSE: dict[str, tuple[str, ...]] = {
     "takes-type": ("type",),
     "takes-any-text": ("enum", "const"),

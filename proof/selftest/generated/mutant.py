@@ -62,7 +62,7 @@ def _after(of: Callable[[str, int], bool]) -> When:
     return lambda seen: seen.before is not None and of(*seen.before)
 
 
-#: By the end of a composed fault's name: when it strikes, as a phrase and as a condition on any exchange.
+#: When a composed fault strikes, as a phrase and as a condition on an exchange, by the end of its name.
 TIMES: Final[Mapping[str, tuple[str, When]]] = {
     "rarely": (f"one time in {RARE}", lambda seen: seen.number % RARE == 0),
     "first": ("the first time", lambda seen: seen.number == 1),
@@ -192,7 +192,7 @@ def striking(make: Callable[[], Change], exchange: Exchange, when: When) -> Chan
 
 
 Alter = Callable[[Request, Response], Response | None]
-# By mode: words that follow the description of a change.
+# Words after the description of a change, for each mode.
 MODES = {
     "rarely": f"one time in {RARE}",
     "together": "while another request is under way",

@@ -10,7 +10,7 @@ from proof.table1.faulty_bodies.missions import MISSIONS
 from proof.table1.faulty_bodies.velocities import READINGS, VELOCITIES
 
 FAULTY_BODIES = {**VELOCITIES, **READINGS, **MISSIONS}
-#: By fault: statement of a faulty body that declares other values than ``baroque.toml``.
+#: Statements of faulty bodies that declare other values than ``baroque.toml``, by fault.
 STATEMENTS = {path.stem: path for path in Path(__file__).parent.glob("*.toml")}
 #: Faults that a statement may excuse: such a body need not fail, but must not pass.
 UNSEEN = frozenset({"dead-base"})

@@ -185,7 +185,7 @@ class Goals:
         self._known.extend(doomed if current is None else [*doomed, current["goal_id"]["id"]])
 
     async def _is_refused(self, reply: CancelGoal.Response, own: _Goal | None) -> bool:
-        """Return whether the navigation goes on with a goal; rclpy's servers refuse with an empty list, and no code."""
+        """Return whether the navigation refused to cancel; rclpy's servers refuse by an empty list without a code."""
         if reply.return_code != CancelGoal.Response.ERROR_NONE or reply.goals_canceling or own is None:
             return bool(reply.return_code == CancelGoal.Response.ERROR_REJECTED)
         # A goal that has just ended is not in the list either.

@@ -31,16 +31,15 @@ class Goals:
 
     def __init__(self, url: Callable[[str], str]) -> None:
         self._url = url(GOAL_PATH)
-        # The goal as last read before a command. Below: since the command.
+        # The goal as last read before a command.
         self._before: Shown | None = None
-        self._since: list[Shown] = []
+        self._since: list[Shown] = []  # the goal as read since the command
         self._first: Exchange | None = None
         self._newest: deque[tuple[Shown, Exchange]] = deque(maxlen=_SHOWN)
-        # How often a member changed with the goal, and how often it first had the old value. Below: members that change
-        # by themselves.
+        # How often a member changed with the goal, and how often it first had the old value.
         self._changed: Counter[str] = Counter()
         self._stale: Counter[str] = Counter()
-        self._living: set[str] = set()
+        self._living: set[str] = set()  # members that change by themselves
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Process one exchange of the run, if it is about the goal."""

@@ -34,8 +34,8 @@ class _State:
     """The readings of one state so far.
 
     Attributes:
-        name: of the state.
-        shape: of its value.
+        name: the name of the state.
+        shape: the shape of its value.
         over_soap, as_xml: what is broken where SOAP, or XML, shows another value.
         differs: returns where a value differs from another one, or an empty text; None if there is no such state.
         before: the value as JSON that was read last since anything may have changed it.
@@ -168,7 +168,7 @@ def _differs(state: _State, one: Any, other: Any) -> str:
     return "" if one is _THERE else state.differs(one, other)
 
 
-#: By member of the SOAP response: path, shape of the list, shape of a named type, and requirement.
+#: For each member of the SOAP response: REST path, shape of the list, shape of a named type, requirement.
 _LISTS: Final[Mapping[bytes, tuple[str, Shape, Shape, str]]] = {
     b"GetSensorsResponse": (SENSORS, SENSORS_SHAPE, MESSAGE_TYPE, "equivalence/sensors"),
     b"GetNavigationServicesResponse": (SERVICES, SERVICES_SHAPE, SERVICE_TYPE, "equivalence/services"),

@@ -60,9 +60,9 @@ class Plans:
         self._frame, self._in_map = motion.frame, Pose(*motion.odom_to_map)
         self._noise_m = FARTHEST * said.limits.noise.position_m
         self._longest_m = said.limits.plan_step_m
-        # The last pose since a command. Below: plans from the robot's place since then.
+        # The last pose since a command.
         self._here: Exchange | None = None
-        self._from_here: list[tuple[Pose, Exchange]] = []
+        self._from_here: list[tuple[Pose, Exchange]] = []  # plans from the robot's place since then
         self._elsewhere = 0
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:

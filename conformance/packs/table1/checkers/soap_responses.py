@@ -35,7 +35,7 @@ from conformance.verdict.evidence import Case, case
 _IDS: Final = {"publishers": "soap-delivery/response-valid", "subscribers": "soap-subscribers/response-valid"}
 _LARGE: Final = 100_000  # longer plans are judged only by the check that requests them, bytes
 _SUFFIX: Final = "Response"
-#: By operation: the requirement and the shape of its content.
+#: The requirement and the shape of the content, for each operation.
 _CONTENT: Final[Mapping[str, tuple[str, Shape]]] = {
     "GetPose": ("pose", ODOMETRY),
     "GetVelocity": ("velocity", TWIST),

@@ -75,10 +75,10 @@ class State:
         self._readings = {url(path): (path, *reading) for path, reading in _READINGS.items()}
         self._last_stamp: tuple[int, int] | None = None
         self._last_received = 0.0
-        # When the odometry last got a new stamp. Below: a velocity that the robot returned although it had no odometry.
+        # When the odometry last got a new stamp.
         self._fresh_at = math.inf
         self._none: bool = False
-        self._velocity_of_none: Exchange | None = None
+        self._velocity_of_none: Exchange | None = None  # returned although the robot had no odometry
         # Single readings, one after another.
         self._sample = OneSample(limits)
         self._beside = BesideOdometry[Velocity](limits)

@@ -408,7 +408,7 @@ def unrenewed_velocities(
         across: the same to the other side.
         others: velocities of another size or with one part alone; the first one's connection is closed.
         effort: quick, standard or deep.
-        seed: of the run.
+        seed: the seed of the run.
     """
     ways: list[tuple[Velocity, By]] = [
         (bent, "linear" if bent.linear_x else "velocity"),

@@ -47,7 +47,7 @@ _SHORTEST: Final = 0.08  # shortest drive that is judged, m
 _LEAST_TURN: Final = 0.2  # smallest turn that is judged, rad
 # Fewest readings to sum: one step says nothing.
 _FEWEST: Final = 3
-# Difference allowed between the summed velocity and the distance: _SHARE of it, plus _OFF m; below, rad.
+# Allowed difference between the summed velocity and the distance: _SHARE of it, plus _OFF, m, or _OFF_TURN, rad.
 _SHARE: Final = 0.1
 _OFF: Final = 0.03
 _OFF_TURN: Final = 0.06

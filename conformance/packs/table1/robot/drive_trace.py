@@ -110,8 +110,8 @@ class Trace:
 
     Attributes:
         begun: start of the drive, s of the run's clock.
-        commands, turns, reaches: all of these, in order.
-        sightings: what single looks show, each with the id of its requirement.
+        commands, turns, reaches: the drive's records of each kind, in order.
+        sightings: cases of single readings, each with the id of its requirement.
         odometry: the odometry of all looks in which it could be read.
         measured: the velocity read with each odometry; the odometry's own where the velocity could not be read.
         outlasted: whether responses take longer than the robot holds a velocity: the pose then cannot be predicted.

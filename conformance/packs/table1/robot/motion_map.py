@@ -19,7 +19,7 @@ from conformance.statement.motion_map import MotionMap, Way
 #: How the last velocity is commanded: both parts, the linear part alone, as XML, or on a connection that is then
 #: closed.
 By = Literal["velocity", "linear", "xml", "closing"]
-#: By way of commanding: a noun phrase for messages.
+#: A noun phrase in messages for each way to command the robot.
 COMMANDS: Final[dict[By, str]] = {
     "velocity": "a PUT of the velocity",
     "linear": "a PUT of its linear part",

@@ -198,7 +198,7 @@ def _beyond_start(plan: Plan, before: Pose, after: Pose) -> float:
 
 _PLACES = 4
 _FAR_M = 1.0
-# Nearer places cannot be told apart by the end of a plan, m.
+# Two places must be this far apart to be distinguished by the end of a plan, m.
 _APART_M = 0.4
 
 

@@ -61,7 +61,7 @@ _COUNTS: Final = {"quick": 60, "standard": 300}  # requests sent again to a fast
 _FEWEST: Final = 8  # requests that are sent again to a slow robot
 # Longest time for these requests if --request-rate limits them, s.
 _LONGEST_S: Final = 0.5
-# By rank of an operation: kinds of fault to send before the next kinds of all operations.
+# Kinds of fault that an operation gets in each round, by its rank.
 _DEPTH: Final = (6, 2, 1)
 
 

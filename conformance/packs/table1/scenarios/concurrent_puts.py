@@ -34,7 +34,7 @@ _CLIENTS: Final = 4  # concurrent clients
 _WATCHED_S: Final = 0.03
 _WATCHED_LONGER_S: Final = 0.1
 _GOAL_STEP_S: Final = 0.02
-# By client: shares of the limits, ahead and turning. A mixture of two clients' velocities equals neither.
+# Shares of the limits for each client, ahead and turning. A mixture of two clients' velocities equals neither.
 _SHARES: Final = ((0.5, -0.5), (-0.5, 0.5)) * 2
 
 

@@ -31,7 +31,7 @@ from conformance.verdict.explorer import Explorer
 _ORDERS: Final = 12
 _ENOUGH: Final = 3  # batches with lost or extra deliveries after which no more are sent, because each takes a long wait
 _KINDS: Final = ("same", "rest", "soap", "coffee")
-# By kind: extreme doubles and integers, in an order that keeps the values of a delivery distinct.
+# Extreme doubles and integers, in an order that keeps the values of a delivery distinct.
 _CORNERS: Final = (
     ("twice", (3, 0.5, -0.0, 1.0, 5e-324, -5e-324, 2.2250738585072009e-308)),
     ("rest", (3, -0.0, -5e-324, 2.2250738585072014e-308, 1.7976931348623157e308, -1.7976931348623157e308, 0.1)),

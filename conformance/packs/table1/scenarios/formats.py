@@ -76,7 +76,7 @@ def formats_in_motion(api: RestInterface, robot: Robot, effort: Effort) -> tuple
     make_room(robot)
     drive = Drive(robot)
     compared: list[FormatsRead] = []
-    # By resource and kind of change: the differences that every first reading has had so far.
+    # The differences that every first reading has had so far, by resource and kind of change.
     suspects: dict[tuple[str, bool], Found] = {}
     for change, wanted in there_and_back(drive, _CHANGES):
         robot.clock.sleep(robot.sample_s if change else 0.0)

@@ -165,7 +165,7 @@ class _Player:
             if unknown != frame:
                 put = self._put_invalid(goal_body(near, unknown), f"the unknown frame {unknown!r}")
                 self.goals = replace(self.goals, unknown_frames=(*self.goals.unknown_frames, put))
-        # All at once: if the robot stops responding meanwhile, their requirement has failed.
+        # Send all of them now: if the robot stops responding, their requirement has failed.
         self.goals = replace(self.goals, far=self._put_far(frame))
 
     def _put_invalid(self, body: dict[str, Any], special: str) -> SpecialGoal:

@@ -18,7 +18,7 @@ from conformance.rules.ros_gateway.arrivals import Request, come_though_refused,
 from conformance.scenarios.rule import NotTested, Outcome, Rule, rule
 from conformance.verdict.evidence import Case
 
-# By how a delivery was sent: the interfaces, if it must make two messages.
+# For a delivery that was sent twice and must give two messages: the interfaces.
 _TWO: Final = {"same": ["rest", "soap"], "twice": ["rest", "rest"]}
 # How a delivery was sent that has one place in the order.
 _ALONE: Final = ("rest", "soap", "coffee")

@@ -56,7 +56,7 @@ _ALONE: Final = 4  # reads of a state over REST before the SOAP reads, and after
 _ROUNDS: Final = 10  # rounds of several clients
 _MOST: Final = 0.8  # a state changes if this share of the responses differ: noise may repeat a value, but less often
 _REPEATS: Final = 3
-# By place: a response that differs, the known value, and the other one.
+# A response that differs, the known value, and the other one, by place.
 _Odd = dict[str, tuple[Exchange, Any, Any]]
 # Difference between the headings of plans, rad: small ones are among them.
 _STEP: Final = 0.07

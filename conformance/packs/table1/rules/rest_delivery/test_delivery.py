@@ -204,7 +204,7 @@ class Listed(NamedTuple):
     """The list after several accepted deliveries; those of other clients may stand between them.
 
     Attributes:
-        entries: of the list, newest first.
+        entries: entries of the list, newest first.
         taken: the deliveries that the robot took, in their order.
         before: the deliveries that the list had before.
     """

@@ -58,7 +58,7 @@ def test_pose(robot: Robot, judge: Judge, effort: Effort) -> None:
                 break
             robot.clock.sleep(0.02)
     if not stamps:
-        # Other responses were judged before; here, that a robot has no odometry for so long.
+        # Earlier responses were judged above; here, the robot had no odometry for the whole time.
         judge.check("rest-resources/pose-type", False, robot.get(POSE), f"a readable odometry within {_PATIENCE_S:g} s")
         return
     judge.check(
