@@ -69,7 +69,7 @@ class Answers:
                 yield from self._judge_numbers(occasion, operation)
 
     def _written(self, occasion: Occasion, operation: Operation, path: str) -> str:
-        """Return the path of what a request has written; empty if it wrote no JSON object to a thing."""
+        """Return the path of the thing that a request has written; empty if it wrote no JSON object to one."""
         body, kind = read_json(occasion.request.body).value, occasion.request.media_type
         if not (isinstance(body, dict) and body and kind in [*operation.bodies][:1] and occasion.is_valid):
             return ""

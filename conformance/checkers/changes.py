@@ -289,7 +289,7 @@ class Changes:
         self._known[path] = _State(now, occasion.response.received_s, ends=ends)
 
     def _judge_final(self, occasion: Occasion, operation: Operation, path: str, now: str) -> Iterator[Case]:
-        """Judge whether a thing that was at its end before is there still, whatever was sent since then."""
+        """Judge whether a thing that was in a final state is still in that state, whatever was sent since."""
         template = operation.template.rstrip("/")
         final, name = self._ended.get(path, ""), self._states[template]
         if final and path not in self._known:

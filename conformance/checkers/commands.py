@@ -1,4 +1,4 @@
-"""Commands on a thing: one that is named for a switch or state leads there, and its response shows what a read does.
+"""Judge commands named after a switch or state: the thing gets that state, and the response equals the next read.
 
 A command is a POST below what a GET reads, such as `POST /pump/enable` beside `GET /pump`. Only a read, one command and
 reads with nothing between them count.

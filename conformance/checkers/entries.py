@@ -226,7 +226,7 @@ class Entries:
             yield occasion.case("description/created-is-there", not lost, expected, found, cause=cause, doubt=doubt)
 
     def _difference(self, entry: _Entry, item: dict[str, Any]) -> tuple[str, bool]:
-        """Return what an entry shows in another way than it was written, and whether it may be written in short."""
+        """Return how an entry differs from what was written, and whether the list may show it in short."""
         schema = _schema_of(entry.operation)
         shape, wrong, is_short = entry.operation.shape, "", False
         for name, value in entry.sent.items():
@@ -276,7 +276,7 @@ class Entries:
     def _judge_refused(
         self, occasion: Occasion, create: Operation, items: dict[str, dict[str, Any]], path: str
     ) -> Iterator[Case]:
-        """Judge whether what is new in a list, and no creation has given, was asked for by a refused one."""
+        """Judge whether a new entry, which no creation returned, comes from a refused creation."""
         parts = parts_of(_schema_of(create))
         free = {name for name, part in parts.items() if is_free_text(part)}
         before, refused = self._listed.get(path), self._refused.pop(path, [])

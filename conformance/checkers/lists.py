@@ -148,7 +148,7 @@ class Lists:
         return [one for one in there if hash((listing.operation.label, one, name, str(value))) in self._seen]
 
     def _cuts(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
-        """Judge that a limit takes away only what is beyond it, where no parameter or link leads to the rest."""
+        """Judge that a list with a limit is full if it leaves items out and no parameter or link leads to them."""
         most, count, places = listing.most(sent), len(page.items), (listing.offset, listing.page, listing.cursor)
         if listing.limit is None or most <= 0 or page.goes_on or any(places):
             return
@@ -303,7 +303,7 @@ class Lists:
             yield occasion.case(id_, not other, expected, found, cause=cause, doubt=doubt)
 
     def _misses(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
-        """Judge that a filter or search keeps each item with what it asks for, in the whole list before and after."""
+        """Judge that a filter or search returns each matching item that the whole list has before and after."""
         items = {one: members_of(item) for one, item in zip(page.identities, page.items, strict=True)}
         path, count = occasion.context.target.partition("?")[0], len(items)
         if is_cut(listing, page, sent):

@@ -267,7 +267,7 @@ class Memory:
             yield occasion.case(id_, holds, expected, f"status {status}", cause=cause, doubt=doubt)
 
     def _again(self, occasion: Occasion, delete: Operation, before: _Thing | None) -> Iterator[Case]:
-        """Judge a DELETE of what is gone already, if it is declared how that is answered."""
+        """Judge a repeated DELETE, if the description says how it is answered."""
         if before is not None and before.gone and before.absent and {"404", "410"} & delete.responses.keys():
             expected = f"a status that says that nothing is there, as a GET after {before.change} did"
             found = f"status {occasion.response.status}"
@@ -358,7 +358,7 @@ class Memory:
                 yield occasion.case("description/defaults", not other, expected, other, cause=cause, doubt=doubt)
 
     def _judge_replacement(self, occasion: Occasion) -> Iterator[Case]:
-        """Judge the response to a PUT whose description says that what is left out has its default."""
+        """Judge the response to a PUT whose description says that missing members get their defaults."""
         operation = occasion.operation if occasion.request.method == "PUT" else None
         if operation is not None and occasion.response.status == HTTPStatus.OK and DEFAULTED.search(operation.text):
             yield from self._defaults(occasion, operation)

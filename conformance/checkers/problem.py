@@ -40,7 +40,7 @@ def inside(occasion: Occasion) -> Iterator[Case]:
 
 
 def same_status(occasion: Occasion) -> Iterator[Case]:
-    """Judge that a problem, where it states a status, states that of its response (RFC 9457 3.1.2)."""
+    """Judge that the member `status` of a problem equals the status of its response (RFC 9457 3.1.2)."""
     answer = occasion.response
     if answer.status < _ERROR or answer.media_type not in {JSON, XML} or not answer.body or answer.cut:
         return

@@ -141,7 +141,7 @@ class Resources:
             self._suspects.append((path, occasion))
 
     def _take_declared(self, occasion: Occasion, path: str) -> Iterator[Case]:
-        """Record what a declared operation's response shows about a path, and judge the cases that waited for that."""
+        """Record whether a response shows that a path exists, and judge the cases that waited for that."""
         status = occasion.response.status
         if status in _GONE or (occasion.request.method == "DELETE" and occasion.response.ok):
             gone = [text for text in self._there if text == path or text.startswith(f"{path.rstrip('/')}/")]

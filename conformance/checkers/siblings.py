@@ -122,7 +122,7 @@ class Siblings:
             yield occasion.case("description/written-is-read", not wrong, expected, found, cause=cause)
 
     def _is_by(self, write: _Write, item: Operation, name: str, now: Any) -> bool:
-        """Return whether a write has changed a member of another thing: to what it sent, or each time to one value."""
+        """Return whether a write has changed a member of another thing: to the sent value, or always to one value."""
         part, label = write.parts.get(name), write.operation.label
         if name in write.sent and same(write.sent[name], now):
             self._taken[label, name].add(clip(now))

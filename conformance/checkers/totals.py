@@ -97,7 +97,7 @@ class _Count:
     other: list[tuple[_Part, int]] = field(default_factory=list)
 
     def learn(self, total: int, part: _Part) -> None:
-        """Record what a total counts, at the end of a list; if the list may be cut, only if both are equal."""
+        """Record what a total counts, at the end of a list; for a list that may be cut, only if both are equal."""
         agrees = total == part.least
         if self.agrees is None and (part.sure or agrees):
             self.agrees = agrees
@@ -114,7 +114,7 @@ class _Count:
         return is_quiet and (self.times >= _OFTEN or now_s - since_s >= SETTLES_S)
 
     def agree(self, page: Page, changed_s: float) -> list[tuple[Occasion, int]]:
-        """Record the list that a total agrees with; return earlier parts that had another total meanwhile.
+        """Record the list that a total agrees with; return earlier parts of the list that had another total.
 
         One that is late after a change is not the number of items that a part shows.
         """
@@ -129,7 +129,7 @@ class _Count:
 
 
 class Totals:
-    """Judges totals over a run, each by what it counted when the whole list was first read."""
+    """Judges totals over a run. Each must keep the meaning that it had when the whole list was first read."""
 
     def __init__(self) -> None:
         self._counts: dict[tuple[str, str, frozenset[tuple[str, str]]], _Count] = defaultdict(_Count)
@@ -281,7 +281,7 @@ def counters_of(operations: Iterable[Operation]) -> dict[str, tuple[Operation, d
 
 
 def numbers_by_items(numbers: dict[str, str], thing: dict[str, Any], items: Sequence[Any]) -> dict[str, float]:
-    """Return the numbers of a thing as the items of the list below it make them, as far as both are known."""
+    """Return the numbers of a thing that follow from the items of the list below it, if both are known."""
     found = dict[str, float]()
     for name, member in numbers.items():
         values: list[Any] = [members_of(item).get(member) if member else 1 for item in items]
@@ -290,7 +290,7 @@ def numbers_by_items(numbers: dict[str, str], thing: dict[str, Any], items: Sequ
 
 
 class Sublists:
-    """Judges lists below a thing: they have as many items as the thing says, and stay when it is written."""
+    """Judges lists below a thing: they have as many items as the thing says, and a write to the thing keeps them."""
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()

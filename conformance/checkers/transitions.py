@@ -1,4 +1,4 @@
-"""States in which operations on a thing are refused by their descriptions, and what a run sees of that."""
+"""Judge operations in states in which their descriptions say that they are refused."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ class Transitions:
     def _act(
         self, occasion: Occasion, operation: Operation, barred: dict[str, frozenset[str]], path: str
     ) -> Iterator[Case]:
-        """Judge an operation by the state that the thing had; one that changes by itself may have changed meanwhile."""
+        """Judge an operation by the thing's state before it. A state that changes by itself may have changed since."""
         for name, states in barred.items():
             value = self._seen.get(path, {}).get(name)
             state = text_of(value) if isinstance(value, str | bool) else ""

@@ -57,7 +57,7 @@ class _Seen(NamedTuple):
 
 
 class Untouched:
-    """Judges each plain GET by the one before, if no request between them may have changed anything."""
+    """Compares each plain GET with the GET before, if no request between them may have changed anything."""
 
     def __init__(self, contract: Contract) -> None:
         self._keeps_all = keeps_all(contract)

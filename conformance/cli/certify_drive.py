@@ -104,7 +104,7 @@ def options_for(options: CertifyOptions, *, named: bool) -> CertifyOptions:
 
 
 def _read_description(judged: Judged) -> tuple[Sequence[Operation], str]:
-    """Return the operations of the device's description, and what it says of all of them."""
+    """Return the operations of the device's description, and its text on the whole API."""
     from conformance.documents.wsdl_pack import services_of, with_messages  # noqa: PLC0415 - lxml takes a while
 
     services = services_of(judged.contract)

@@ -177,7 +177,7 @@ def _print_line(cause: dict[str, Any], requirement: dict[str, Any]) -> None:
 
 
 def _word(requirement: Mapping[str, Any], failure: Mapping[str, Any]) -> str:
-    """Return what a finding does: a doubtful one warns, even of a requirement that fails by another one."""
+    """Return the word for a finding's effect: a doubtful one warns, even if another finding fails the requirement."""
     return "WARN" if "doubt" in failure else requirement["verdict"].upper()
 
 

@@ -113,7 +113,7 @@ def report_failure(error: Exception) -> ExitCode:
 
 
 def _keep(error: Exception) -> str:
-    """Write the traceback to a file; return where it is, as the end of a sentence, or an empty text."""
+    """Write the traceback to a file; return its path, as the end of a sentence, or an empty text."""
     try:
         descriptor, path = tempfile.mkstemp(prefix="roaas-error-", suffix=".txt")
         with os.fdopen(descriptor, "w", encoding="utf-8", errors="backslashreplace") as file:

@@ -135,7 +135,7 @@ def columns(stream: TextIO | None = None) -> int | None:
 
 
 def wrap(text: str, stream: TextIO | None = None) -> str:
-    """Return a line of words in lines as wide as the terminal, all with its indent; not for what is to be copied."""
+    """Return a text in lines as wide as the terminal, all with its indent. Not for commands that users copy."""
     width, indent = columns(stream), text[: len(text) - len(text.lstrip(" "))]
     if width is None:
         return text

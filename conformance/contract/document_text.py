@@ -224,7 +224,7 @@ class _Reader:
 
 
 def check_yaml(text: str) -> None:
-    """Check that a parser can build what a YAML stream holds: libyaml follows nesting to the end of its stack.
+    """Check that a parser can build a YAML document: too deep nesting overflows libyaml's stack.
 
     Raises:
         ValueError: it is nested too deeply, or its aliases repeat too much.

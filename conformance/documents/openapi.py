@@ -197,7 +197,7 @@ _ORDERING: Final = re.compile(r"sort|order|direction|format|view|fields|include|
 
 
 def _guess(operation: Operation, operations: Iterable[Operation]) -> Operation:
-    """Return a read whose content the description does not declare with what it shows by what is written there.
+    """Return a read without a declared content, with the members that writes to the same path take.
 
     Frameworks such as FastAPI declare `{}` for a function without an annotated response.
     """

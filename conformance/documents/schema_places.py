@@ -173,7 +173,7 @@ _PLACES: Final = 20
 
 
 def foreign_words(document: Schema) -> list[str]:
-    """Return each word of another version in the schemas of a document, with the places where it stands."""
+    """Return each keyword of another OpenAPI version in the schemas of a document, with its places."""
     places: dict[str, list[str]] = {}
     for _, _, told, pointer in _find(document):
         places.setdefault(told, []).append(pointer)

@@ -59,7 +59,7 @@ class Side:
         self._opaque = OPAQUE if "xml" in media_type else OPAQUE[:-1]
 
     def schema(self, given: Any) -> Any:
-        """Return a schema of the document, prepared."""
+        """Return a schema of the document as this direction uses it, in the form of JSON Schema 2020-12."""
         return self._prepare(modern(given), frozenset())
 
     def target(self, schema: Any) -> Any:

@@ -179,7 +179,7 @@ def _without_slow_patterns(folder: Path) -> bool:
     return found
 
 
-# Particles of a type: an automaton may grow with their square. A group counts as often as it is used, and a base type
+# Most particles of a type: an automaton may grow with their square. A group counts for each use, and a base type
 # for each derived type.
 _MOST_PARTICLES: Final = 1_000
 # Sum of the squared particles of all types: some 100 bytes and two microseconds each.

@@ -270,7 +270,7 @@ def member_name(place: str) -> str:
 
 
 def axis_of(place: str) -> str:
-    """Return what a number is called, without its unit and without words for a position or a velocity."""
+    """Return a number's name without its unit and without words for a position or a velocity."""
     last = place.rpartition("/")[2]
     item = f"_{last}" if last.isdecimal() else ""
     return f"{_BESIDE.sub('', member_name(place)).strip('_').lower()}{item}"

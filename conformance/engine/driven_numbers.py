@@ -166,7 +166,7 @@ class Looks:
         return any(f"{value:g}" in ids for _, value in self.samples(operation, f"{thing}/id", 0.0)[-1:])
 
     def _turn(self, operation: str, place: str) -> float:
-        """Return what a whole turn is at a place; 0 if it is no angle that begins anew."""
+        """Return the value of a whole turn at a place; 0 if the number is no angle that wraps around."""
         if ANGLE in place:
             return math.tau
         if not self.is_heading(place):

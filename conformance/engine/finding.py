@@ -228,7 +228,7 @@ def _values_in(operation: Operation, call: str) -> dict[str, str]:
 
 
 def _with_values(operation: Operation, values: Mapping[str, str]) -> Operation:
-    """Return an operation with values of parameters in its path, which are then no parameters any more."""
+    """Return an operation with fixed values for some parameters of its path."""
     if not any(item.name in values for item in operation.parameter("path")):
         return operation
     path = NAME.sub(lambda name: values.get(name[1], name[0]), operation.template)
@@ -403,7 +403,7 @@ class Finder(ABC):
         self._words = {}
 
     def _states(self) -> dict[str, Any]:
-        """Return what is neither number nor long in the first reading: states, by JSON pointer."""
+        """Return the states in the first reading, by JSON pointer: values that are neither numbers nor long texts."""
         content = self._binding.content(self._send(self._plan.reads[0].label, None).response.body)
         members = members_of(content)
         return {
@@ -411,7 +411,7 @@ class Finder(ABC):
         }
 
     def _template(self, names: Mapping[str, Any]) -> Any:
-        """Return the body of a command with templates at some places, and with the lease where it belongs there."""
+        """Return the body of a command with templates at some places, and with the lease if it has a place for one."""
         schema = body_schema(self._plan.drive)
         if schema is None:
             return None
@@ -426,7 +426,7 @@ class Finder(ABC):
         """The body of a command; None if it has none."""
 
     def _sending_lines(self, names: Collection[str], still: Mapping[str, float], seconds: object) -> Iterator[str]:
-        """Yield how the map sends a command: numbers by name, and what it sends for those that stay ``still``."""
+        """Yield the lines of the map for a command: numbers by name, and the values for those that stay ``still``."""
         template = self._plan.drive.label
         for name, value in still.items():
             template = template.replace(f"{{{name}}}", f"{value:g}")
@@ -521,7 +521,7 @@ class Finder(ABC):
         return True
 
     def halt(self) -> str:
-        """Stop the device, if what it was commanded has no end of its own; return why it may still move, or nothing."""
+        """Stop the device, unless its last command ends by itself; return why it may still move, or nothing."""
         return ""
 
     def _send(self, call: str, body: Any) -> Exchange:

@@ -179,7 +179,7 @@ _MEASURED: Final = re.compile(r"twist|velocit|speed", re.IGNORECASE)
 
 
 class _Pair(NamedTuple):
-    """What is sent and where it is read: the numbers that are commanded, by their places in a state, or in one each."""
+    """A command and where its effect is read: the commanded numbers, by their places in one state, or in one each."""
 
     state: Operation
     sent: Operation
@@ -282,7 +282,7 @@ def _stop(operations: Sequence[Operation], move: Operation) -> Iterator[str]:
 
 
 def _belongs(state: Operation, sent: Operation) -> bool:
-    """Return whether whoever knows the path of what is sent can read a state."""
+    """Return whether the path of a state needs no other parameters than that of the command."""
     return {item.name for item in state.parameters if item.required} <= {item.name for item in sent.parameter("path")}
 
 

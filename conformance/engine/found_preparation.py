@@ -1,4 +1,4 @@
-"""Find what a device wants before it moves: a lease, and commands such as enable and home, by the description's words.
+"""Find what a device needs before it moves, by the description's words: a lease, and commands such as enable and home.
 
 The suite sends none of these operations before the device has refused a command, or accepted it and stayed where it is.
 """
@@ -97,7 +97,7 @@ class Preparing:
             yield f"and at the end {', '.join(last) or 'nothing, as no operation is known that ends it'}."
 
     def lines(self, failed: tuple[str, Any] | None = None) -> Iterator[str]:
-        """Yield the lines of a map; ``failed``: where a 2xx says whether the request failed, and what it has if not."""
+        """Yield the lines of a map; ``failed``: where a 2xx says whether it failed, and the value on success."""
         if self.steps or failed:
             yield "[motion]"
             yield from ([f"failed = {inline({'at': failed[0], 'not': failed[1]})}"] if failed else [])
@@ -145,7 +145,7 @@ NOTHING: Final = Preparing()
 
 
 def preparing_of(operations: Sequence[Operation], drive: Operation, rules: CallRules) -> Preparing:
-    """Return what a device may want before it moves, by the words of its operations: those nearest to the drive."""
+    """Return what a device may need before it moves, by the words of its operations, nearest to the drive first."""
     known = [one for one in operations if not is_excluded(one, rules)]
     near = sorted(
         filter(_may_prepare, known),
@@ -161,7 +161,7 @@ def preparing_of(operations: Sequence[Operation], drive: Operation, rules: CallR
 
 
 def named_preparing(operations: Sequence[Operation], calls: Iterable[str], rules: CallRules) -> Preparing:
-    """Return what a user says that a device wants before it moves: "POST /enable", or with JSON behind the path.
+    """Return the operations that a user names with --before: "POST /enable", perhaps with JSON behind the path.
 
     Raises:
         NotPossibleError: one is no operation of the description, or must never be called.
@@ -210,7 +210,7 @@ def lease_place(operation: Operation) -> str:
 
 
 def wants_more(exchange: Exchange) -> bool:
-    """Return whether a device refused a command for what it wants before, by status or words of the response."""
+    """Return whether a device refused a command because another one must come first, by status or text."""
     said = exchange.response.body[:2000].decode("utf-8", "replace")
     return exchange.response.status in WANTS_LEASE | {_FORBIDDEN} or bool(_WANTS.search(said))
 
@@ -267,7 +267,7 @@ def _with_token(operation: Operation) -> str:
 
 
 def _body(operation: Operation, *, on: bool | None = None) -> Any:
-    """Return a usual body of an operation; ``on``: what a member has that switches something; None: without one."""
+    """Return a usual body of an operation; ``on``: value for a member that switches something, or None."""
     schema = body_schema(operation)
     if schema is None:
         return None

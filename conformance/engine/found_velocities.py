@@ -370,7 +370,7 @@ class VelocityFinder(Finder):
         return _STOPS_S if since is None else since - ended
 
     def _rises_s(self, number: Commanded, place: str, response: Response) -> float:
-        """Drive at the limit, back to where it came from; return how long it may take to reach that velocity, s.
+        """Drive back at the limit; return how long the device may take to reach that velocity, s.
 
         Its acceleration shows there alone. 0: it was not seen to reach it.
         """
@@ -416,7 +416,7 @@ class VelocityFinder(Finder):
         settle_s: float,
         hold_s: float | None,
     ) -> Iterator[str]:
-        """Yield the lines of the map, each figure with where it comes from."""
+        """Yield the lines of the map, each figure with its origin."""
         read, numbers = self._reads[0].label, {command.name: command for command in self._plan.numbers}
         places = {
             place: one
@@ -501,7 +501,7 @@ class VelocityFinder(Finder):
         return float(f"{max(AT_REST * fastest, 3 * abs(drift or 0.0)):.3g}")
 
     def _axis(self, place: str, response: Response, number: Commanded | None, fastest: float) -> str:
-        """Return an axis of the state, within some room around where it is."""
+        """Return an axis of the state, with limits around its present position."""
         samples = self._looks.samples(self._reads[0].label, place, 0.0)
         here = samples[-1][1]
         scale, (way, turn) = _unit(response.ratio)

@@ -33,7 +33,7 @@ _SERVER_SHOWN = 80
 
 
 class _Remedy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One way to meet rules that a server does not meet by itself.
+    """One way to meet rules that a web server breaks by default.
 
     Attributes:
         words: such as "behind nginx"; a text follows that says what is met.

@@ -28,7 +28,7 @@ FULL: Final = frozenset({409, 507})
 def created_path(
     surveyor: Surveyor, create: Operation, read: Operation, statuses: Container[int] = frozenset({201})
 ) -> str:
-    """Create a thing; return the path by which it is read, as far as the response says where it is, or nothing.
+    """Create a thing; return the path by which it is read, if the response contains it.
 
     With the status 202 among those of a creation that counts, a thing may come later, or end by itself.
     """

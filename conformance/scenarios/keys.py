@@ -191,7 +191,7 @@ class _Rounds:
         return Keyed(self.operation.label, "same request", shown, expected, fault)
 
     def _otherwise(self, first: Exchange, again: Exchange, name: str) -> str:
-        """Return a member that the repeated response alone shows in another way; the thing may have gone on."""
+        """Return a member that differs only in the repeated response; the thing itself may have changed."""
         was, now = members(first, ()), members(again, ())
         other = [one for one in was.keys() & now.keys() if not same(was[one], now[one])]
         if not other or self._item is None or not name.startswith("/"):

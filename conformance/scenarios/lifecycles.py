@@ -480,7 +480,7 @@ class _Cycle:
 
 
 def _news(was: dict[str, Any], said: dict[str, Any]) -> dict[str, Any]:
-    """Return the texts and truth values that a response has in another way than they were read before."""
+    """Return the texts and booleans in a response that differ from the read before."""
     changed = {name: one for name, one in said.items() if name in was and one != was[name]}
     usable = [name for name, one in changed.items() if isinstance(one, str | bool)]
     return {name: changed[name] for name in usable if not _TIMES.search(plain_name(name))}

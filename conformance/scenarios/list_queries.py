@@ -102,7 +102,7 @@ def _beyond(value: Any, *, is_least: bool) -> str | None:
 
 
 def searches(listing: Listing, page: Page) -> Iterator[dict[str, Any]]:
-    """Yield texts: one that no item has, special ones, and ends of words in what a search looks at, in any case."""
+    """Yield search texts: one that no item has, special ones, and ends of words of searched members in any case."""
     search = listing.search
     if search is None:
         return

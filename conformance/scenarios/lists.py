@@ -153,7 +153,7 @@ def _selections(listing: Listing, page: Page) -> Iterator[tuple[dict[str, Any], 
 
 
 def pages_below(api: RestInterface, values: Values, listing: Listing, path: str) -> Iterator[Paged]:
-    """Yield what is seen of a list below a thing in parts."""
+    """Read a list below a thing in parts, and yield the parts."""
     reader = Reader(api, values, listing, path=path)
     yield from _Parts(reader).all(reader.until)
     page = reader.page()

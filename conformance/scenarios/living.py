@@ -192,7 +192,7 @@ class Living:
         return [thing for thing in self.things if thing.is_own and thing.state is state]
 
     def remember(self, thing: Thing, write: Write | None, operation: Operation) -> None:
-        """Remember the values that a request has written, as far as they read as written."""
+        """Remember the values of a request that a read returned as they were written."""
         thing.kept = {}
         thing.last = write.found if write else thing.last
         if write is None or not operation.bodies:

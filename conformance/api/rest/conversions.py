@@ -1,4 +1,4 @@
-"""Find what a lenient reader makes of a JSON body: values of the declared types with the same meaning."""
+"""Convert a JSON body as a lenient server may: to values of the declared types with the same meaning."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def _is_alike(one: Any, other: Any) -> bool:
 
 
 def _at(said: Any, steps: Steps) -> Any:
-    """Return what is at a place of a response, or at this place within one of its members; else NOTHING."""
+    """Return the value at a place of a response, or at this place within one of its members; else NOTHING."""
     value = said
     try:
         for step in steps:

@@ -124,7 +124,7 @@ def _log_in(told: dict[str, Any], contexts: Contexts) -> None:
 
 
 def _stop(told: dict[str, Any], contexts: Contexts) -> None:
-    """Send each stop several times, and those that the device does not take until the time is over."""
+    """Send each stop several times; repeat a refused one until the time is over."""
     until = time.monotonic() + told["for_s"]
     passes = 0
     waiting = told["stops"]

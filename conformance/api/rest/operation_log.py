@@ -85,7 +85,7 @@ class OperationLog(Listener):
                 self.left.follow(operation, exchange)
 
     def tidy_up(self, api: RestInterface, longest_s: float) -> bool:
-        """Delete what the run created, and write back what it changed, for so long at most; return whether it wrote."""
+        """Delete what the run created, and write back what it changed, within a time; return whether it wrote."""
         return self._services is None and self.left.tidy_up(api, longest_s)
 
     def by_hand(self, exchange: Exchange) -> None:

@@ -44,7 +44,7 @@ class RequestContext:
 
     @classmethod
     def of(cls, contract: Contract, base_url: str, request: Request) -> RequestContext | None:
-        """Return a request as the contract sees it; None where it went elsewhere."""
+        """Return a request with what the contract says about it; None if it went to another server."""
         if not request.url.startswith(base_url):
             return None
         target = request.url[len(base_url) :]

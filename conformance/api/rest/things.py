@@ -101,7 +101,7 @@ def below_others(operations: Mapping[tuple[str, str], Operation], method: str, i
 
 
 def creator_of(operations: Mapping[tuple[str, str], Operation], read: Operation) -> Operation | None:
-    """Return the POST that creates what a GET reads: at its collection, or, if it returns it whole, below others."""
+    """Return the POST that creates what a GET reads: at its collection, or a POST elsewhere with the same response."""
     members = parts_of(read.shape)
     below = (one for one in below_others(operations, "POST", read) if "201" in one.responses)
     known = (one for one in below if members and parts_of(one.shape) == members)
@@ -279,7 +279,7 @@ def _others(schema: Schema, value: Any, turn: int, collections: frozenset[str]) 
 def differences(
     sent: dict[str, Any], seen: dict[str, Any], schema: Schema, answer: Schema | None, collections: frozenset[str]
 ) -> Iterator[str]:
-    """Yield each member that reads in another way than it was written, as a noun phrase.
+    """Yield each member with another value than was written, as a noun phrase.
 
     Members that the device sets or hides by their name or mark, that the response does not have, and that are
     normalized (case, space, rounding) are left out.
@@ -305,7 +305,7 @@ def differences(
 
 
 def _is_converted(part: Any) -> bool:
-    """Return whether the description of a member says that the device changes what is written."""
+    """Return whether the description of a member says that the device changes written values."""
     return isinstance(part, dict) and bool(CONVERTED.search(str(flat(part).get("description"))))
 
 
@@ -325,7 +325,7 @@ def _of_items(
     answer: Schema | None,
     collections: frozenset[str],
 ) -> Iterator[str]:
-    """Yield what a list of objects lacks; another order, more items, and several put together are free."""
+    """Yield the values that a list of objects lacks. A device may change the order, add items, and merge items."""
 
     def other(one: dict[str, Any], item: dict[str, Any]) -> list[str]:
         own = {name: value for name, value in one.items() if not is_shared(name)}
@@ -371,7 +371,7 @@ def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, 
 
 
 def parts_of(schema: Schema | None) -> dict[str, Any]:
-    """Return the members of a schema, or of the object in its envelope; what is no object is its own only member."""
+    """Return the members of a schema, or of the object in its envelope; any other schema counts as its only member."""
     kinds = kinds_of(schema or {})
     if kinds - {"null"} and "object" not in kinds:
         return {WHOLE: schema}
@@ -478,7 +478,7 @@ def is_moved(value: Any, now: Any) -> bool:
 
 
 class Leaf(NamedTuple):
-    """A member that was sent and is there: its path, its schema, the value, what was there before, and what is now."""
+    """A member that was sent and exists: its path, its schema, the sent value, the value before, and the value now."""
 
     name: str
     part: Schema
@@ -500,7 +500,7 @@ def leaves_of(
     above: str = "",
     of: str = "",
 ) -> Iterator[Leaf]:
-    """Yield what was sent and is there now, in objects and maps too; of: what all are called, as entries of a map."""
+    """Yield the members that were sent and exist now, also in objects and maps; of: name for the entries of a map."""
     for name in sent.keys() & now.keys():
         part, value, was, seen = flat(parts.get(name, {})), sent[name], before.get(name), now[name]
         if value and isinstance(value, dict) and isinstance(seen, dict):

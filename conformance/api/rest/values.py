@@ -79,7 +79,7 @@ class Values:
                 self._learn_id(operation, item)
 
     def _note_deletion(self, operation: Operation, exchange: Exchange) -> None:
-        """Remember that a thing is gone, or that it is there, and whether PUT has created it (RFC 9110 9.3.4)."""
+        """Remember whether a thing exists, and whether PUT has created it (RFC 9110 9.3.4)."""
         above, _, last = operation.template.rstrip("/").rpartition("/")
         text = unquote(urlsplit(exchange.request.url).path.rstrip("/").rpartition("/")[2])
         if last.startswith("{") and operation.method == "DELETE":

@@ -80,7 +80,7 @@ def accepted_messages(soap: SoapServices, service: SoapService, *ids: str) -> li
 def is_gone(
     soap: SoapServices, service: SoapService, accepted: tuple[SoapOperation, Node], answer: SoapResponse
 ) -> bool:
-    """Return whether a refusal only shows that the thing to be read has ended meanwhile.
+    """Return whether a refusal only shows that the thing to be read has ended before.
 
     Args:
         soap: the services of the run.

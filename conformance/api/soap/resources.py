@@ -347,7 +347,7 @@ def _is_plain(payload: etree._Element, act: Act) -> bool:
 
 
 def _without_empty(value: Any, emptied: frozenset[str]) -> Any:
-    """Return what a request says: a device may leave a list that is not there, or xsi:nil, as it was."""
+    """Return a request's values without empty lists and xsi:nil, for which a device may keep the old value."""
     if not isinstance(value, dict):
         return [_without_empty(item, emptied) for item in value] if isinstance(value, list) else value
     return {

@@ -63,7 +63,7 @@ def _first_at(readings: tuple[Reading, ...], goal: dict[str, float], motion: Mot
 
 @rule("motion/way", on=ALL)
 def way(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether the device stays within its limits on all its ways; where it begins beyond them is its affair."""
+    """Judge whether the device stays within its limits in all moves. A start beyond the limits does not count."""
     for leg in legs_of(trace):
         seen = usable(leg)
         for name, axis in motion.state.axes.items():

@@ -40,7 +40,7 @@ def responses(trace: Services, ros: RosMap) -> Iterator[Outcome]:
 
 
 def _own(crowd: Crowd, definition: Definition, ros: RosMap) -> Iterator[Outcome]:
-    """Judge whether each of many clients gets the response to its call; of equal calls, each gets another one."""
+    """Judge whether each of many clients gets the response to its own call, also if calls are equal."""
     body, left = crowd.body, defaultdict[str, list[str]](list)
     for message in crowd.heard:
         if message.what == "response":

@@ -15,7 +15,7 @@ _TWICE = 2
 
 
 def _judged_steps(trace: Walk, state_map: StateMap) -> Iterator[Step]:
-    """Yield the steps that were taken where they must be, without those that a change by itself may have overtaken.
+    """Yield the steps that must be accepted, without those that the device's own change of state may have overtaken.
 
     It has where it left the device in a state that follows by itself, while another try was in time, or was none.
     """
@@ -33,7 +33,7 @@ def _status_text(step: Step) -> str:
 
 @rule("states/taken", on=(walked,))
 def taken(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
-    """Judge whether operations are taken where they must be; a state that ended meanwhile is an excuse."""
+    """Judge whether operations are accepted where they must be, unless the state may have ended before."""
     for step in trace.steps:
         ended = step.shown[0] != step.state and step.state in state_map.changes
         if state_map.operations[step.operation].is_taken_in(step.state) and (step.taken or not ended):
@@ -56,7 +56,7 @@ def _unseen(trace: Walk) -> Iterator[Outcome]:
 
 @rule("states/refused", on=(walked,))
 def refused(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
-    """Judge whether operations are refused where they must be; in a state that changes by itself, twice."""
+    """Judge whether operations are refused where they must be; in a state that changes by itself, each time."""
 
     def place(step: Step) -> tuple[str, str]:
         return step.operation, step.state

@@ -88,7 +88,7 @@ def tried_at_rest(
 
 
 def _let_rest(mapped: MappedDevice, settle: Callable[[], object]) -> None:
-    """Let a device that takes no positions rest by itself, which may set out again after a stop; else ``settle``."""
+    """Wait until a device without positions rests by itself, as it may move again after a stop; else ``settle``."""
     if mapped.motion.goto is None:
         with suppress(NotPossibleError):
             mapped.come_to_rest(stop=False)

@@ -1,4 +1,4 @@
-"""Bring a device to where it has room for a drive."""
+"""Bring a device to a place with room for a drive."""
 
 from __future__ import annotations
 
