@@ -102,6 +102,6 @@ def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item:
     if said.verdict == VALID and said.operation is not None:
         expect(judge, "http/declared-status", exchange).that(
             answer.status not in _POSITIVE_REFUSALS,
-            f"a status by which {said.operation.id} does not refuse the form of a valid request",
+            f"no refusal of a valid request for {said.operation.id}",
             cause=f"{said.operation.id} {answer.status}",
         )

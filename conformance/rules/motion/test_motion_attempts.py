@@ -152,7 +152,7 @@ def fresh(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
             longest_s <= motion.state.fresh_s,
             seen[-1].exchange,
             f"another position at least every {motion.state.fresh_s:g} s under way",
-            observed=f"the same one for {longest_s:.2f} s, and then another place",
+            observed=f"the same position for {longest_s:.2f} s, then another one",
             cause="stale",
         )
 

@@ -116,7 +116,7 @@ class Goals:
             "rest-resources/goal-get",
             not odd,
             exchange,
-            "the goal as it is shown just before and just after",
+            "the goal as GET returned it just before and just after",
             found=f"{odd[0]} is {between.get(odd[0])!r} for {first[odd[0]]!r}" if odd else "",
             cause=f"{odd[0]} now and then" if odd else "",
         )
@@ -135,7 +135,7 @@ class Goals:
                 not often or _whole(place) in self._living,
                 exchange,
                 "one goal, and no part of the one before it",
-                found=f"{place} is that of the goal before, in what is shown first of {self._stale[place]} goals",
+                found=f"the {place} of the previous goal in the first reading of {self._stale[place]} goals",
                 cause=f"{place} of the goal before",
             )
 

@@ -156,7 +156,7 @@ class AcrossInterfaces:
             requirement,
             not found or soon or self._others[key] < _OFTEN,
             exchange,
-            "what GET as JSON gives before and after it",
+            "the value that GET as JSON returned before and after it",
             found=f"{found}; {self._others[key]} times",
             cause=f"{state.name} now and then",
         )
@@ -239,7 +239,7 @@ class Lists:
                 holds=entries == listed,
                 exchange=other,
                 expected=f"the entries of GET {seen.path} before and after it",
-                found=f"{len(entries)} entries for {len(listed)}; in one only: {', '.join(odd[:3])}",
+                found=f"{len(entries)} entries for {len(listed)}; in only one of them: {', '.join(odd[:3])}",
                 cause="other entries",
             )
         seen.listed, seen.received_s = listed, exchange.response.received_s

@@ -163,7 +163,7 @@ class SoapPoses:
                 "equivalence/pose",
                 not found,
                 one,
-                f"the message with this stamp, as GET {POSE} gives it just before and after",
+                f"the message with this stamp, as GET {POSE} returned it just before and after",
                 found=found,
                 cause="another message",
             )

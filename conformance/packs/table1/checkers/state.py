@@ -184,7 +184,7 @@ class State:
                 holds=False,
                 exchange=exchange,
                 expected="503 where the odometry is older than one second",
-                found=f"odometry that came {sent - self._fresh_at:.1f} s ago already",
+                found=f"a stamp that has not changed for {sent - self._fresh_at:.1f} s",
                 cause="old",
             )
         self._clock.take(now - elapsed_ms / 2000, stamp[0] + stamp[1] / 1e9)
@@ -387,7 +387,7 @@ class BesideOdometry(Generic[_Value]):
                 fits,
                 reading.exchange,
                 f"a {noun} that the odometry had before or after; the nearest is {nearest}",
-                f"{reading.value}, and out so {self.out} times",
+                f"{reading.value}; {self.out} readings differ like this",
                 "out now and then",
             )
 

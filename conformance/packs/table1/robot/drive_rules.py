@@ -252,7 +252,7 @@ def _way(sums: Sequence[_Sums], noise: Noise) -> Case | None:
     return Case(
         _agrees(sums, operator.attrgetter("length"), operator.attrgetter("way"), room),
         last.exchange,
-        f"a displacement of ({whole.x:.3f}, {whole.y:.3f}) m, which is what the velocity adds up to",
+        f"a displacement of ({whole.x:.3f}, {whole.y:.3f}) m, the sum of the velocity over time",
         observed=f"the pose moved by ({last.pose.x - first.pose.x:.3f}, {last.pose.y - first.pose.y:.3f}) m",
         cause="another way",
     )
@@ -269,7 +269,7 @@ def _turn(sums: Sequence[_Sums], noise: Noise) -> Case | None:
     return Case(
         _agrees(sums, operator.attrgetter("turned"), operator.attrgetter("turn"), room),
         sums[0].trace[-1].exchange,
-        f"a turn of {whole.turn:.3f} rad, which is what the angular velocity adds up to",
+        f"a turn of {whole.turn:.3f} rad, the sum of the angular velocity over time",
         observed=f"the heading turned by {whole.turn + whole.turn_error:.3f} rad",
         cause="another turn",
     )

@@ -134,15 +134,15 @@ def test_clock(robot: Robot, judge: Judge, clock: Clock) -> None:
         "rest-resources/pose-clock",
         clock.is_right(scale),
         robot.get(POSE),
-        f"a clock that goes {scale:g} times as fast as the one on the wall, within 5 %",
-        found=f"{rate:.3f} times as fast over {clock.span_s:.1f} s",
+        f"stamps that advance by {scale:g} s each second, within 5 %",
+        found=f"{rate:.3f} s each second, over {clock.span_s:.1f} s",
         cause="another rate",
     )
     judge.check(
         "rest-resources/pose-clock",
         not clock.stands_between(scale),
         robot.get(POSE),
-        "nanoseconds that advance as the time does within a second",
+        "nanoseconds that advance with real time within a second",
         found=f"{clock.fine_rate or 0.0:.2g} times as fast within a second",
         cause="below a second",
     )
@@ -190,7 +190,7 @@ def _read_often(robot: Robot, judge: Judge, what: str, path: str, shape: Shape, 
                 listed == before,
                 exchange,
                 "the same list as before",
-                found=f"{len(before)} entries, then {len(listed)}; {len(set(before) ^ set(listed))} in one only",
+                found=f"{len(before)} entries, then {len(listed)}; {len(set(before) ^ set(listed))} differ",
                 cause="another list",
             )
         before = listed
