@@ -384,7 +384,7 @@ def states_of(read: Operation, name: str) -> tuple[str, ...]:
 
 def leads_to(operation: Operation, read: Operation, name: str) -> str:
     """Return the one state to which an operation leads by its description, as in "The job is then paused"."""
-    sentences = [text for text in re.split(r"[.;:]\s", operation.text) if not _UNLESS.search(text)]
+    sentences = [text for text in re.split(r"[.;:]\s|, (?=and )", operation.text) if not _UNLESS.search(text)]
     said = {word for text in sentences for found in _LEADS.finditer(text) for word in found.groups() if word}
     found = [state for state in states_of(read, name) if state in said]
     return found[0] if len(found) == 1 else ""

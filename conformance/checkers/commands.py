@@ -17,7 +17,7 @@ from conformance.api.rest.listing import listing_of
 from conformance.api.rest.patches import same
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import id_member, object_in, parts_of
-from conformance.checkers.changes import DONE
+from conformance.checkers.changes import DONE, FINAL, leads_to, state_of
 from conformance.checkers.occasion import SETTLES_S, Occasion
 from conformance.checkers.transitions import state_member
 from conformance.contract.pack import Contract
@@ -30,6 +30,7 @@ from conformance.verdict.evidence import Case
 
 _TWICE = 2  # failures that count; a single one may be chance
 _MOST = 1_000  # things that are remembered
+_AT_ONCE_S = 0.15  # a read within this time shows what the response had to show, s
 # Phrases in a description which say that a command acts later or not always, or that its response shows what was.
 _LATER: Final = re.compile(
     r"\b(?:asynchron\w*|eventual\w*|later|schedul\w*|background|once|when|if|unless|previous(?:ly)?|before|after|request)\b",
@@ -68,15 +69,21 @@ class Command(NamedTuple):
         read: the GET of the thing.
         switch: the boolean that it sets, and its value then; None if it sets none.
         state: the member with the thing's state, and the states from which the command leads to another; None: none.
+        leads: that member, and the state to which the command leads by its description; None: it says none.
     """
 
     operation: Operation
     read: Operation
     switch: tuple[str, bool] | None
     state: tuple[str, frozenset[str]] | None
+    leads: tuple[str, str] | None
 
     def is_due(self, before: dict[str, Any], now: dict[str, Any]) -> str:
         """Return the member that the command has to change and has not, or an empty text."""
+        if self.leads is not None and str(before.get(self.leads[0])).casefold() not in FINAL:
+            name, to = self.leads
+            if name in before and before[name] == now.get(name) != to:
+                return name
         if self.switch is not None:
             name, value = self.switch
             return name if before.get(name) is (not value) and now.get(name) is (not value) else ""
@@ -85,6 +92,15 @@ class Command(NamedTuple):
             is_undone = bool(words_of(self.operation.template) & _ENDS) and plain_name(str(now.get(name))) in DONE
             return name if str(before.get(name)) in states and (before[name] == now.get(name) or is_undone) else ""
         return ""
+
+    def other_state(self, answer: Any, before: dict[str, Any], now: dict[str, Any]) -> str:
+        """Return the state in the response, if it or that at a read is not the one to which the command leads."""
+        name, to = self.leads or ("", "")
+        told = str(object_in(answer, {plain_name(one) for one in now}).get(name, to))
+        # What is on its way says so.
+        is_astray = told == now.get(name) and not told.endswith("ing") and told.casefold() not in FINAL
+        is_old = told == before.get(name) and now.get(name) == to
+        return told if told != to and (is_astray or is_old) and before.get(name) != to else ""
 
     def untrue(self, answer: Any, before: dict[str, Any], now: dict[str, Any]) -> str:
         """Return the member that the response shows changed and a read does not, or an empty text."""
@@ -111,7 +127,9 @@ def commands_of(operations: list[Operation]) -> list[Command]:
         if is_command and read is not None and parts_of(read.shape):
             words = words_of(last)
             verb = next(iter(words)) if len(words) == 1 and not _LATER.search(operation.text) else ""
-            found.append(Command(operation, read, _switch(verb, read), _state(verb, read)))
+            name = state_of(read)
+            leads = (name, to) if name and (to := leads_to(operation, read, name)) else None
+            found.append(Command(operation, read, _switch(verb, read), _state(verb, read), leads))
     return found
 
 
@@ -176,7 +194,7 @@ class Commands:
         if sent is not None and sent.operation is not None and sent.response.received_s <= occasion.sent_s:
             command = self._commands[sent.operation.label]
             # The device may also change the state itself, but only to the state that the command leads to.
-            state = command.state[0] if command.state is not None else ""
+            state = (command.state or command.leads or ("",))[0]
             kept = {name: one for name, one in was.items() if name == state or (read.label, name) not in self._moving}
             yield from self._judge(occasion, command, kept, now)
         if path not in self._sent and len(self._seen) < _MOST:
@@ -192,6 +210,13 @@ class Commands:
         told = read_json(answer.body).value if is_json(answer.media_type) else None
         untrue = "" if _LATER.search(command.operation.text) else command.untrue(told, before, now)
         missed = command.is_due(before, now)
+        other = command.other_state(told, before, now) if command.leads and not missed else ""
+        if command.leads and not missed and occasion.sent_s - answer.received_s < _AT_ONCE_S:
+            self._missed[f"{label} other"] += bool(other)
+            if not other or self._missed[f"{label} other"] >= _TWICE:
+                expected = f"{command.leads[1]} as {command.leads[0]}, to which {label} leads by its description"
+                found, cause = f"{other} as {command.leads[0]} in its response", f"{label} leads"
+                yield sent.case("description/states", not other, expected, found, cause=cause)
         is_over = bool(missed) and plain_name(str(now.get(missed))) in DONE
         if (untrue or missed) and not is_over and occasion.sent_s - answer.received_s < SETTLES_S:
             return

@@ -27,6 +27,7 @@ from conformance.api.rest.things import (
     WHOLE,
     Leaf,
     differences,
+    is_altered,
     is_devices,
     is_moved,
     is_reordered,
@@ -55,7 +56,6 @@ _EXACT: Final = 2**53
 _TELLING: Final = 5  # a value with this many characters is unlikely to appear by chance
 _EQUAL = 1e-14  # doubles count as equal up to this relative difference
 _CLOSE = 0.005  # a larger relative difference is not caused by rounding
-_ZEROS: Final = re.compile(r"\b0+(?=\d)")
 #: Phrases in a description on members that a PUT leaves out.
 GONE: Final = re.compile(
     r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\b(?:gone|removed|deleted|cleared|unset)\b",
@@ -403,7 +403,7 @@ class Writes:
             elif not same(now, was) and _is_other(part, value, now):
                 wrong = f"{now} as {name}"
             elif isinstance(value, str) and isinstance(now, str) and is_free_text(part):
-                is_lost = _is_altered(value, now) or (says_exactly(part) and value != now)
+                is_lost = is_altered(name, part, value, now) or (says_exactly(part) and value != now)
                 wrong = f"{clip(now)} as {name}" if is_lost else ""
                 doubt = _LINES if value.splitlines() == now.splitlines() else ""
             elif isinstance(value, list) and isinstance(now, list) and not same(now, was):
@@ -455,6 +455,8 @@ class Writes:
         if all(isinstance(item, str) and item.strip() == item != "" for item in (*value, *now)):
             # A device may leave out what is there twice, and sort texts.
             is_fewer = set(now) < set(value) or (set(now) > set(value) and name == WHOLE)
+            pairs = zip(*(sorted(items, key=str.casefold) for items in (value, now)), strict=False)
+            is_fewer |= len(now) == len(value) and any(is_altered(name, inner, *pair) for pair in pairs)
         return f"{clip(now)} as {name}" if is_other or is_fewer else ""
 
     def _left_out(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
@@ -581,8 +583,3 @@ def _is_other(part: Schema, value: Any, now: Any) -> bool:
     is_code = isinstance(value, str) and isinstance(now, str) and says_exactly(part) and not is_free_text(part)
     is_time = part.get("format") in {"date", "date-time"}
     return is_moved(value, now) if is_time else is_code and value != now
-
-
-def _is_altered(value: str, now: str) -> bool:
-    """Return whether a text reads without its leading zeros, or with other ends of lines."""
-    return value != now and (_ZEROS.sub("", value) == _ZEROS.sub("", now) or value.splitlines() == now.splitlines())

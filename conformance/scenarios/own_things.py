@@ -523,9 +523,11 @@ class _Thing:
             taken = {name: theirs[name] for name in unique.names(create) if name in theirs and name in parts}
             kept = {name: one for name, one in own.items() if name in parts and not parts[name].get("readOnly")}
             if taken:
-                self.send(
-                    change, taken if change.method == "PATCH" else {**kept, **taken}, *self._current(), place="body"
-                )
+                # What is right beside it must not be stored either.
+                bodies, names = self._bodies(change), unique.names(change)
+                more = {name: one for body in bodies[:-1] for name, one in body.items() if name not in names}
+                right = more if change.method == "PATCH" else {**kept, **more}
+                self.send(change, {**right, **taken}, *self._current(), place="body")
                 self.get()
                 other.get()
         if delete is not None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, Final
 
-from conformance.api.rest.inputs import usual_inputs
+from conformance.api.rest.inputs import request_of, usual_inputs
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.variations import NO_FORMAT
 from conformance.documents.json_text import read_json
@@ -91,6 +92,15 @@ def refuse_creation(living: Living, create: Operation, turn: int) -> None:
         tried.append(writer.send(create, living.at, other[0], media_type=_TEXT))
         if "406" in create.responses:
             tried.append(writer.send(create, living.at, other[1], headers=(("Accept", NO_FORMAT),)))
+    thing, names = living.things[-1], writer.values.unique.names(create)
+    taken = {name: one for name, one in members(thing.last, names).items() if name in names}
+    new = next(iter(writer.bodies(create, turn + 3 * _STEP, {})), None)
+    if new is not None and taken:
+        usual = usual_inputs(create, writer.values)[0]
+        request = request_of(create, replace(usual, body={**new, **taken}))
+        tried.append(writer.api.send(replace(request, target=living.at or request.target)))
+        if is_refused(tried[-1]):
+            living.check(thing, tried[-1], create.label, Kind.REFUSED)
     refused = [exchange for exchange in tried if is_refused(exchange, create)]
     before = living.listing.ids
     listing = living.list_of(living.things[-1]) if refused else living.listing

@@ -32,7 +32,7 @@ _BEYOND_DOUBLES: Final = 2**53 + 1  # an integer that is no double
 _KEYS: Final = ("roaas-one", "roaas-two", "roaas-three")  # keys of entries that are added to a map
 _LONGEST: Final = 300  # longest text that is sent, characters
 _NULLS: Final = 2  # members that a patch removes by null, where that is allowed
-_TIME: Final = "2026-02-{:02}T12:34:56+02:00"
+_TIME, _FINER = "2026-02-{:02}T12:34:56+05:30", ".625-03:30"
 
 
 def special_bodies(
@@ -73,7 +73,7 @@ def special_bodies(
     yield from half_valid(change, usual, changed)
     # All together, and what has a time zone alone: the device may have a reason to refuse another one.
     zoned = [
-        {name: one.replace("+02:00", "-03:30")}
+        {name: one.replace("+05:30", _FINER)}
         for name, one in changed.items()
         if flat(parts[name]).get("format") == "date-time"
     ]
@@ -207,13 +207,15 @@ def _telling(schema: Schema, value: Any, turn: int) -> Iterator[Any]:
         yield from (-_BEYOND_DOUBLES, _BEYOND_DOUBLES)
     elif isinstance(value, list):
         apart = alike_and_apart(schema)[1][::-1]
-        yield from ([*apart, *apart[:1]], apart)
+        # Capital letters, and an order that is not that of the alphabet.
+        cased = [one.title() if isinstance(one, str) else one for one in apart[:1]]
+        yield from ([*cased, *apart[1:], *apart[:1]], [*apart, *apart[:1]], apart)
     elif schema.get("format") == "date-time":
         yield _TIME.format(turn)
     elif isinstance(value, str) and is_free_text(schema):
         # The longest allowed text: a device may cut it, or count bytes.
         most = min(schema.get("maxLength", 0), _LONGEST)
-        yield from (*((text * most)[:most] for text in TEXTS[:1] if most > len(text)), *TEXTS)
+        yield from (*(f"{(text * most)[: most - 1]}Z" for text in TEXTS[:1] if most > len("007 ")), *TEXTS)
 
 
 def _nulls(

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Collection, Iterator, Mapping
 from datetime import UTC, datetime
 from functools import lru_cache
 from http import HTTPStatus
 from typing import Any, Final, NamedTuple, TypeGuard
 
-from conformance.api.rest.references import refers, singular
+from conformance.api.rest.references import is_free_text, refers, singular
 from conformance.api.rest.samples import FORMATS, alike_and_apart, entry_of, fits, sample
 from conformance.api.rest.values import IDS
 from conformance.documents.json_schema import Schema, is_number, kinds_of
@@ -31,6 +32,11 @@ _OWN: Final = re.compile(
     r"(?:id|pk|url|href|status|state|version|revision|etag|created|updated|modified|changed|timestamp|time"
     r"|owner|author|user|password|secret|token|pin|key|[^a-z](?:at|by)|(?:[a-z]ed|[^a-z]?(?:seen|made|built|sent))_?on"
     r"|(?:created|updated|modified|changed|deleted|started|finished|completed)_?(?:at|by))$|^(?:at|by)$"
+)
+# Times that a client plans or tells, such as `scheduled_at`.
+_PLANNED: Final = re.compile(
+    r"(?:^|_)(?:(?:schedul|plann|plant|install|purchas)ed|(?:schedule|plan|start|begin|end|due|depart|run|fire|wake|remind"
+    r"|valid|available|deliver|pick_?up|sow)s?)_(?:at|on)$"
 )
 # States of things that are deleted and can still be read.
 _DELETED: Final = re.compile(r"delet|remov|archiv|retire|decommission|trash|tombstone|gone|cancell?ed|aborted|revoked")
@@ -73,6 +79,12 @@ _SHARED: Final = re.compile(r"(?:default|primary|active|selected|current|order|i
 _COMPARED: Final = frozenset({"", "email", "uuid", "hostname", "date", "date-time"})
 # A text with one of these keywords has a declared length, so a device must not shorten it.
 _BOUNDED: Final = frozenset({"pattern", "maxLength"})
+_ZEROS: Final = re.compile(r"\b0+(?=\d)")
+# Members that are compared without case, and may be kept so.
+_CASELESS: Final = re.compile(
+    r"mail|host|domain|ur[il]|mac(?:address)?$|colou?r|units?$|code|country|lang|locale|currency|slug|key|user|login|hash"
+    r"|uuid|hex|serial|extension|format|encoding"
+)
 # Identifiers that the suite chooses where the client may choose them.
 _CHOSEN: Final = ("roaas-{}", "roaas{}", "3fa85f64-5717-4562-b3fc-2c963f66af{:02}")
 _CHOSEN_NUMBER: Final = 987_001
@@ -398,7 +410,8 @@ def is_devices(name: str, part: Any, collections: frozenset[str]) -> bool:
 @lru_cache(maxsize=1024)
 def _is_own_name(name: str) -> bool:
     """Return whether a name is that of a member that the device sets: ``created_at``, and ``createdAt`` alike."""
-    return _OWN.search(re.sub(r"[^A-Za-z0-9]+|(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()) is not None
+    snake = re.sub(r"[^A-Za-z0-9]+|(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+    return _OWN.search(snake) is not None and _PLANNED.search(snake) is None
 
 
 def is_reordered(value: Any, now: Any, part: Any) -> bool:
@@ -410,6 +423,19 @@ def is_reordered(value: Any, now: Any, part: Any) -> bool:
     is_text = all(isinstance(one, str) for one in (*value, *now))
     is_plain = all(map(is_number, (*value, *now))) or (is_text and now != sorted(now, key=str.casefold))
     return is_plain and sorted(value) == sorted(now)
+
+
+def is_altered(name: str, part: Schema, value: str, now: str) -> bool:
+    """Return whether a free text reads without leading zeros, letters' case, accents or signs, or with other lines.
+
+    White space at its ends and the form of combining marks are free, and the case of what is compared without it.
+    """
+    is_free = is_free_text(part) and not (_is_converted(part) or _CASELESS.search(plain_name(name)))
+    apart = [" ".join(unicodedata.normalize("NFC", text).split()) for text in (value, now)]
+    plain = ["".join(one for one in unicodedata.normalize("NFKD", text) if one.isascii()) for text in (value, now)]
+    is_same = _letters(plain[0]) == _letters(plain[1]) != "" and apart[0] != apart[1]
+    is_broken = _ZEROS.sub("", value) == _ZEROS.sub("", now) or value.splitlines() == now.splitlines()
+    return value != now and (is_broken or (is_free and is_same))
 
 
 def is_shared(name: str) -> bool:

@@ -49,6 +49,7 @@ _PATHS = {
         for name, text in (
             ("cancel", "Cancel it"), ("lock", "Lock it"), ("unlock", "Unlock it"), ("fill", "Fill it up"),
             ("pause", "It pauses when it can"), ("check", "Check it"), ("start", "Start it"), ("stop", "Stop it"),
+            ("launch", "A queued job becomes running. In every other status: 409."),
         )
     },
 }  # fmt: skip
@@ -92,6 +93,13 @@ def _broken(contract, steps):
         ([_get(status="idle"), _do("start", status="idle"), _get(4, status="idle")] * 2, {_STATES}),
         ([_get(status="idle"), _do("start"), _get(status="done")] * 2, set()),
         ([_get(), _do("start"), _get(4)] * 2, set()),  # what is queued may wait
+        ([_get(), _do("launch"), _get(status="running")] * 2, {_STATES}),  # the response shows the state before
+        ([_get(), _do("launch"), _get(status="running")], set()),  # once
+        ([_get(), _do("launch"), _get(4, status="running")] * 2, set()),  # later
+        ([_get(), _do("launch", status="running"), _get(status="running")] * 2, set()),
+        ([_get(), _do("launch", status="running"), _get(status="done")] * 2, set()),
+        ([_get(), _do("launch"), _get(4)] * 2, {_STATES}),
+        ([_get(), _do("launch", status="idle"), _get(status="idle")] * 2, {_STATES}),
         ([_get(status="running"), _do("stop", status="running"), _get(4, status="running")] * 2, {_STATES}),
         ([_get(status="running"), _do("stop"), _get(4, status="idle")] * 2, set()),
         ([_get(), _do("fill", litres=9), _get(4)] * 2, {_READ}),

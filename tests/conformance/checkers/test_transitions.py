@@ -25,6 +25,7 @@ _STATES, _KEEPS = "description/states", "description/refused-keeps"
 _ELSE = "In another state it is answered 409, and nothing changes."
 _SAID = {
     "start": f"Start a stopped belt. {_ELSE}",
+    "thaw": "paused becomes running, and its count is set. In every other status, and in mode `off`: 409.",
     "resume": f"Let a paused belt run again. {_ELSE}",
     "pause": "Pause a running belt. 409 if it cannot be done.",
     "halt": f"Not for a stopped belt. {_ELSE}",
@@ -94,6 +95,7 @@ _BROKEN = {
         _STATES,
     ),
     "resumed from stopped": (_RESUMED * 2, _STATES),
+    "thawed from done": ([("GET . 200", "done"), ("POST /thaw 200", "running")], _STATES),
     "two run at once": ([(f"GET {number} 200", "running") for number in (1, 2, 1)], _STATES),
     "resumed when told done": ([("POST /stop 200", "done"), ("POST /resume 200", "running")], _STATES),
     "launched beside another": (
@@ -127,6 +129,7 @@ _RIGHT = {
     "resumed from stopped once, which may have been paused just then": _RESUMED,
     "paused from stopped, which no word forbids": [("GET . 200", "stopped"), ("POST /pause 200", "paused")] * 2,
     "halted from running, beside a state that is denied": [("GET . 200", "running"), ("POST /halt 200", "stopped")] * 2,
+    "thawed from paused": [("GET . 200", "paused"), ("POST /thaw 200", "running")] * 2,
     "sealed again after another change": [("POST /seal 200",), ("POST /grease 200",), ("POST /seal 200",)],
     "woken, and at its end already": [("GET . 200", "paused"), ("POST /wake 200", "done")],
     "woken, and answered before": [("GET . 200", "paused"), ("POST /wake 200", "paused")] * 2,

@@ -11,6 +11,9 @@ _PARTS = {
     "mode": {"type": "string", "enum": ["off", "on", "auto"], "default": "on"},
     "loud": {"type": "boolean", "default": False},
     "note": {"type": ["string", "null"], "maxLength": 500},
+    "title": {"type": "string", "description": "Kept in lower case."},
+    "email": {"type": "string"},
+    "scheduled_at": {"type": "string", "format": "date-time"},
     "exact": {"type": "number", "format": "double"},
     "from": {"type": "string", "format": "date-time"},
     "path": {"type": "array", "items": {"type": "number"}},
@@ -129,6 +132,12 @@ BROKEN = {
     "responses that show what was before": (_told_late(2.5, 3.5), READ),
     "a number that is the same whatever is sent": (
         [_put(**{**_WHOLE, "count": count}, told={"count": 5}) for count in (1, 5, 9)], READ,
+    ),
+    "a text in lower case": ([_get(), _put(**{**_WHOLE, "note": "Big Zoë"}), _get(note="big zoë")], READ),
+    "a text without accents": ([_get(), _put(**{**_WHOLE, "note": "Big Zoë"}), _get(note="Big Zoe")], READ),
+    "items in lower case": ([_get(), _put(**_WHOLE, words=["B", "a"]), _get(words=["b", "a"])], READ),
+    "a planned time in another zone": (
+        [_get(), _put(**{**_WHOLE, "scheduled_at": _EAST}), _get(scheduled_at=_EAST.replace("+02:00", "Z"))], READ,
     ),
     "a text is cut": ([_get(), _put(note="é" * 300, told={"note": "é" * 255})], READ),
     "readOnly by PUT": ([_get(), _put(gain=2.5, built="roaas-own"), _get(gain=2.5, built="roaas-own")], OWN),
@@ -291,6 +300,13 @@ BROKEN = {
 }  # fmt: skip
 #: The same for right devices.
 RIGHT = {
+    "a text in lower case, as is said": [_get(), _put(**{**_WHOLE, "title": "Big Zoë"}), _get(title="big zoë")],
+    "what is compared without case": [_get(), _put(**{**_WHOLE, "email": "Zoe@X"}), _get(email="zoe@x")],
+    "a text without blanks at its ends": [_get(), _put(**{**_WHOLE, "note": " Big  Zoë "}), _get(note="Big Zoë")],
+    "a text in another form": [_get(), _put(**{**_WHOLE, "note": "Zoe\u0308"}), _get(note="Zo\u00eb")],
+    "a planned time in UTC": [
+        _get(), _put(**{**_WHOLE, "scheduled_at": _EAST}), _get(scheduled_at="2026-02-01T10:34:56Z")
+    ],
     "an earlier version is taken, which no description forbids": [
         _get("/said", version=2), _put("/said", **_WHOLE, version=1, told={"version": 3}), _get("/said", version=3),
     ],
