@@ -9,9 +9,12 @@ from dataclasses import dataclass
 from typing import Final
 
 from conformance.api.rest.interface import RestInterface
+from conformance.measures.samples import SEVERAL
 from conformance.observe.clock import WALL_CLOCK, Clock, poll_for
 from conformance.scenarios.motion.binding import Binding, binding_of
+from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.motion.templates import NoValueError, at
+from conformance.scenarios.motion.trace import Reading, middle_of
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.state_map import StateMap
@@ -20,6 +23,11 @@ from conformance.transport.exchange import Exchange, NoAnswerError
 _PACE_S: Final = 0.03  # pause between reads of the state, s
 _STAYS_S: Final = 0.3  # how long the state is watched after it was reached, and after a refusal, s
 _KEEPS_S: Final = 0.1
+# _SETTLES_S: how long a device may settle in a state of rest, s. _STILL_S: how long it is watched for a motion, s.
+_SETTLES_S: Final = 1.0
+_STILL_S: Final = 0.5
+# Standard deviations of a reading that are noise.
+_SIGMAS: Final = 6.0
 # Tries of an operation that comes too late for a state that changes by itself.
 _TRIES: Final = 3
 # Most operations to send on the way to each pair of operation and state.
@@ -48,6 +56,21 @@ class Step:
 
 
 @dataclass(frozen=True)
+class Rest:
+    """What the axes did in a state in which the device does not move.
+
+    Attributes:
+        state: the state that was read before and after.
+        exchange: the request that showed it, and its response.
+        ways: by axis, how far it moved after it had time to settle, and how far it may seem to; empty if none moved.
+    """
+
+    state: str
+    exchange: Exchange
+    ways: dict[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
 class Walk:
     """A walk through the states.
 
@@ -57,6 +80,7 @@ class Walk:
         steps: what was sent.
         first: the state at the beginning.
         last: the state at the end.
+        rests: what was seen in states of rest.
     """
 
     states: tuple[str, ...]
@@ -64,6 +88,7 @@ class Walk:
     steps: tuple[Step, ...]
     first: str
     last: str
+    rests: tuple[Rest, ...] = ()
 
 
 class _Walker:
@@ -76,6 +101,10 @@ class _Walker:
         # By state and operation: the state that followed, by the map or as observed; "": none.
         self._led: dict[tuple[str, str], str] = {}
         self.steps: list[Step] = []
+        self.rests: list[Rest] = []
+        motion, self._mapped = api.run.statement.motion_map, None
+        if motion is not None and motion.state.axes and states.at_rest:
+            self._mapped = MappedDevice(api, motion, clock, self._binding)
         self.first = self.here = self._read()
 
     def walk(self) -> None:
@@ -136,6 +165,7 @@ class _Walker:
             for _ in poll_for(self._clock, _PACE_S, within_s):
                 self.here = self._read()
                 if self.here != before:
+                    self._watch_rest()
                     return
             self._led["", before] = ""
             return
@@ -157,6 +187,35 @@ class _Walker:
         self.steps.append(Step(name, before, exchange, taken, tuple(shown), arrived or shown[-1] in wanted))
         self.here = shown[-1]
         self._led[name, before] = self.here if self.here != before else ""
+        self._watch_rest()
+
+    def _watch_rest(self) -> None:
+        """Record whether the device moves in a state of rest, after the time in which it may settle."""
+        mapped, state = self._mapped, self.here
+        if mapped is None or state not in self._map.at_rest:
+            return
+        axes, ways = mapped.motion.state.axes, dict[str, tuple[float, float]]()
+        begun = self._clock.now()
+
+        def way_of(readings: list[Reading]) -> dict[str, float]:
+            seen = [one for one in readings if one.values and one.sent > readings[-1].sent - _STILL_S]
+            sides = (seen[:SEVERAL], seen[-SEVERAL:])
+            return {name: abs(axis.apart(*(middle_of(side, name) for side in sides))) for name, axis in axes.items()}
+
+        def is_still(readings: list[Reading]) -> bool:
+            if self._clock.now() < begun + _STILL_S or not readings[-1].values:
+                return False
+            return all(way <= mapped.motion.tolerance(name) for name, way in way_of(readings).items())
+
+        if not is_still(mapped.watch(begun + _SETTLES_S, is_still)):
+            shown, seen = self._read(), mapped.watch(self._clock.now() + _STILL_S)
+            self.here = self._read()
+            if not shown == self.here == state or not all(reading.values for reading in seen):
+                return
+            for name, way in way_of(seen).items():
+                most = 2 * mapped.motion.tolerance(name) + _SIGMAS * mapped.resting.axes[name].sigma
+                ways[name] = way, most
+        self.rests.append(Rest(state, self._shown, ways))
 
     def _look(self, shown: list[str]) -> None:
         state = self._read()
@@ -166,6 +225,7 @@ class _Walker:
     def _read(self) -> str:
         made = self._binding.make(self._map.read, None)
         exchange = self._api.client.send(made.method, made.target, headers=made.headers, body=made.body)
+        self._shown = exchange
         try:
             said = str(at(self._binding.content(exchange.response.body), self._map.at))
         except NoValueError as error:
@@ -194,7 +254,7 @@ def walked(api: RestInterface, state_map: StateMap) -> Walk:
     taken_in = {name: tuple(filter(one.is_taken_in, states)) for name, one in state_map.operations.items()}
 
     def walk_so_far() -> Walk:
-        return Walk(states, taken_in, tuple(walker.steps), walker.first, walker.here)
+        return Walk(states, taken_in, tuple(walker.steps), walker.first, walker.here, tuple(walker.rests))
 
     try:
         walker.walk()

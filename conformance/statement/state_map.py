@@ -78,6 +78,7 @@ class StateMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         changes: what the device does by itself, by the state before it.
         within_s: time for an operation without a time of its own, s.
         failed: how a 2xx says that its request failed, or None.
+        at_rest: the states in which the device does not move, by the axes of its motion map.
     """
 
     read: Call
@@ -87,6 +88,7 @@ class StateMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     changes: dict[str, Change] = {}
     within_s: Positive = 5.0
     failed: Failed | None = None
+    at_rest: tuple[State, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that there is something to judge, that each operation can be sent, and that the state can be found.
@@ -105,6 +107,8 @@ class StateMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"pattern = {self.pattern!r} must have one group, which is the state")
         if len(self.states) < 2:  # noqa: PLR2004 - a state, and another one
             raise ValueError("operations name fewer than two states in from, to and via")
+        if strange := set(self.at_rest) - set(self.states):
+            raise ValueError(f"at_rest names {min(strange)!r}, which is no state of operations or changes")
 
     @property
     def states(self) -> tuple[str, ...]:

@@ -104,7 +104,7 @@ def leads(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
 
 @rule("states/order", on=(walked,))
 def order(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
-    """Judge whether the states on the way are those of the map, in its order."""
+    """Judge whether the states on the way are those of the map, in its order, and none of rest while it moves."""
     for step in _judged_steps(trace, state_map):
         one = state_map.operations[step.operation]
         if not one.to:
@@ -119,3 +119,8 @@ def order(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
         yield Case(
             at < len(way), step.exchange, expected, ", then ".join(step.shown), f"{step.operation} in {step.state}"
         )
+    for rest in trace.rests:
+        moved = [f"{name} moved by {way:.3g}" for name, (way, most) in rest.ways.items() if way > most]
+        expected = f"no motion in the state {rest.state}, a second after it was shown"
+        found = f"{rest.state} before and after {' and '.join(moved)} in half a second" if moved else ""
+        yield Case(not moved, rest.exchange, expected, found, f"at rest in {rest.state}")

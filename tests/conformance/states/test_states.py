@@ -1,21 +1,24 @@
 """The class states: a right cell is led through all states, and each fault of its state machine is named."""
 
+import random
+import time
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import msgspec
 import pytest
+from aiohttp import web
 from cell import FAULTS, MAP, Cell
 from driven_device import driven
-from small_device import certified, small_device
+from small_device import certified, reading, small_device
 
 from conformance.contract.pack import Contract
 from conformance.rules.states import test_state_machine
 from conformance.scenarios.rule import Rule
 from conformance.scenarios.states import Step, Walk, walked
 from conformance.statement.state_map import StateMap
-from conformance.statement.statement import StatementError, load_statement
+from conformance.statement.statement import StatementError, load_statement, motion_map_of
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.evidence import Case
 from reports.certificate.moves_drawn import grid
@@ -79,6 +82,94 @@ def test_a_fault_is_named(failed_by, fault, requirement):
     assert failed_by[fault] <= {requirement, "leads", "order", "keeps"}
 
 
+_RESTING = """
+[states]
+read = "GET /cell"
+at = "/state"
+at_rest = ["ready"]
+[states.operations]
+"POST /start" = { from = ["ready"], via = ["starting"], to = "running" }
+"POST /stop" = { from = ["ready", "starting", "running"], to = "ready" }
+"""
+_MOTION = """
+[motion.state]
+read = "GET /pose"
+axes = { x = { at = "/x", limits = [-100, 100], unit = "m" } }
+[motion.goto]
+send = "POST /start"
+body = { x = "{x}" }
+tolerance = 0.02
+"""
+
+
+class Arm(Cell):
+    """A cell whose arm moves while a program runs, and for a while after that.
+
+    Args:
+        coasts_s: how long it moves after its program has ended or was stopped, s.
+        creeps: how fast it does, m/s.
+        noise: standard deviation of its position as it is read.
+        program_s: how long a program runs, s; None: until it is stopped.
+    """
+
+    def __init__(self, coasts_s=0.0, creeps=0.3, noise=0.0, program_s=None):
+        super().__init__(program_s=program_s)
+        self._creeps, self._coasts_s, self._noise = creeps, coasts_s, noise
+        self._x, self._at, self._until, self._random = 0.0, time.monotonic(), 0.0, random.Random(3)  # noqa: S311 - noise
+        pose = {"type": "object", "required": ["x"], "properties": {"x": {"type": "number"}}}
+        self.description["paths"]["/pose"] = reading(pose)
+        self.routes["/pose"] = {"GET": self._pose}
+
+    def _go_on(self):
+        now, runs = time.monotonic(), self._state in {"starting", "running"}
+        moves_s = max(0.0, (now if runs else min(now, self._until)) - self._at)
+        self._x, self._at = self._x + moves_s * (0.3 if runs else self._creeps), now
+
+    def _to(self, state):
+        self._go_on()
+        runs = self._state in {"starting", "running"}
+        self._until = time.monotonic() + self._coasts_s if runs else self._until
+        super()._to(state)
+
+    async def _pose(self, _):
+        _ = self.state
+        self._go_on()
+        return web.json_response({"x": self._x + self._random.gauss(0.0, self._noise)})
+
+
+_ENDS = '\n[states.changes.running]\nto = ["ready"]\nwithin_s = 3\n'
+
+
+@pytest.mark.parametrize(
+    ("arm", "more", "blamed"),
+    [
+        (Arm(), "", False),
+        (Arm(noise=0.03), "", False),
+        (Arm(coasts_s=0.6), "", False),
+        (Arm(coasts_s=9, creeps=0.02), "", False),
+        (Arm(coasts_s=0.6, noise=0.01, program_s=0.5), _ENDS, False),
+        (Arm(coasts_s=9), "", True),
+        (Arm(coasts_s=9, noise=0.01), "", True),
+        (Arm(coasts_s=9, program_s=0.5), _ENDS, True),
+    ],
+    ids=[
+        "it rests", "with noise", "it settles", "it creeps within its tolerance", "its program ends and it settles",
+        "it moves on", "it moves on with noise", "its program ends and it moves on",
+    ],
+)  # fmt: skip
+def test_ready_is_not_said_while_it_moves(arm, more, blamed, tmp_path):
+    states = msgspec.convert(tomllib.loads(_RESTING + more)["states"], StateMap)
+    motion = motion_map_of(_MOTION, "the map")
+    with driven(arm.description, arm.routes, tmp_path) as (api, _, _):
+        api.run.allow_motion = True
+        api.run.statement = msgspec.structs.replace(api.run.statement, motion_map=motion)
+        walk = walked.play(api, states)
+    assert walk.rests
+    found = [one for one in test_state_machine.order.judge(walk, states) if isinstance(one, Case) and not one.holds]
+    assert bool(found) is blamed, [rest.ways for rest in walk.rests]
+    assert all(" moved by " in one.observed and "/cell" in one.exchange.request.target for one in found)
+
+
 def test_a_program_that_ends_by_itself_is_no_fault(judged):
     more = 'running = { to = ["ready"], within_s = 2 }\n'
     outcome = judged(Cell(program_s=0.4), more)
@@ -121,6 +212,7 @@ def test_a_map_among_the_examples_is_right(path):
             "form",
         ),
         ('[states]\nread = "GET /cell"\nat = "/s"\n[states.operations]\ngo = { to = "b" }\n', "needs send ="),
+        (MAP.replace("within_s = 2", 'at_rest = ["redy"]'), "at_rest names 'redy'"),
         ('[states]\nread = "GET /cell"\nat = "/s"\npattern = "a"\noperations = {}\n', "must have one group"),
         ('[states]\nread = "GET /cell"\nat = "/s"\npattern = "(a"\noperations = {}\n', "no regular expression"),
     ],
