@@ -69,7 +69,7 @@ class Command(NamedTuple):
         read: the GET of the thing.
         switch: the boolean that it sets, and its value then; None if it sets none.
         state: the member with the thing's state, and the states from which the command leads to another; None: none.
-        leads: that member, and the state to which the command leads by its description; None: it says none.
+        leads: that member, and the state to which the command leads by its description; None if it says none.
     """
 
     operation: Operation

@@ -26,9 +26,9 @@ from conformance.verdict.evidence import Case
 _MOST: Final = 1_000
 # Parts of a path that refer to different things at different times.
 _ALIASES: Final = frozenset({"active", "current", "default", "first", "last", "latest", "me", "newest", "next", "self"})
-# _TWICE: different values that another thing must have taken over. _RESETS: how often a member must have become the
-# same. _ALONE: reads with nothing between them in which it must have stayed.
-_TWICE, _RESETS, _ALONE = 2, 3, 3
+_TWICE = 2  # different written values that another thing must have taken over
+_RESETS = 3  # how often a member must have got the same value after a write
+_ALONE = 3  # reads without a write between them in which a member must have kept its value
 
 
 class _Write(NamedTuple):
@@ -49,15 +49,14 @@ class Siblings:
         self._items = {path: one for path, one in reads.items() if collection_of(path)}
         self._lists = {collection_of(path): one for path, one in self._items.items()}
         self._collections = collections_of(operations)
-        # By path: members at the last read; below: writes to others of the collection since then.
-        self._last: dict[str, dict[str, Any]] = {}
+        self._last: dict[str, dict[str, Any]] = {}  # members at the last read, by path
+        # Writes to other things of the collection since that read, by path.
         self._since: dict[str, list[_Write]] = defaultdict(list)
-        # By template: reads alone; members that changed by themselves.
-        self._alone: Counter[str] = Counter()
-        self._moving: set[tuple[str, str]] = set()
-        # By operation and member: values of what was written that others had then; how often it became a value.
+        self._alone: Counter[str] = Counter()  # reads without a write since the read before, by template
+        self._moving: set[tuple[str, str]] = set()  # members that changed between such reads
+        # Written values that other things then had, by operation and member.
         self._taken: dict[tuple[str, str], set[str]] = defaultdict(set)
-        self._became: Counter[tuple[str, str, str]] = Counter()
+        self._became: Counter[tuple[str, str, str]] = Counter()  # how often a member got the same other value
 
     def forget(self) -> None:
         """Forget all reads: something else may have changed the things."""

@@ -88,7 +88,7 @@ class Transitions:
                 }
             )
         }
-        # By operation: where it leads by its description; by path template: the states from which operations lead.
+        # The state to which each operation leads by its description, and the states before it.
         self._turns = {
             operation.label: turn
             for operation in operations

@@ -41,8 +41,7 @@ _IDS: Final = ("id", "uuid", "guid")
 _REFUSALS: Final = frozenset({"409", "422"})
 # Statuses of a creation, and of an activity that begins.
 _MADE: Final = frozenset({HTTPStatus.CREATED, HTTPStatus.ACCEPTED})
-# Phrases in a description which say that a retry gets the first result; below, that a refused request leaves its key
-# unused.
+# Phrases in a description: a retry gets the first result; another body with the same key is refused.
 _FIRST: Final = re.compile(
     r"\b(?:first|original|same|earlier|previous|stored) (?:answer|response|result|reply)\b", re.IGNORECASE
 )

@@ -13,9 +13,10 @@ from conformance.scenarios.singletons import is_changeable, is_free
 from conformance.scenarios.survey import Surveyor
 from conformance.scenarios.writing import Writer, members
 
-# Things that are written, in how many turns; others that are only read. _FIRST: number for the first values.
-_WRITTEN, _TURNS, _OTHERS = 2, 2, 3
-_FIRST: Final = 51
+_WRITTEN = 2  # things that are written
+_TURNS = 2  # how often each of them is written
+_OTHERS = 3  # other things, which are only read
+_FIRST: Final = 51  # number from which the first values are made
 
 
 def write_siblings(surveyor: Surveyor, operations: Mapping[tuple[str, str], Operation]) -> None:

@@ -23,9 +23,8 @@ from conformance.transport.exchange import Exchange, NoAnswerError
 _PACE_S: Final = 0.03  # pause between reads of the state, s
 _STAYS_S: Final = 0.3  # how long the state is watched after it was reached, and after a refusal, s
 _KEEPS_S: Final = 0.1
-# _SETTLES_S: how long a device may settle in a state of rest, s. _STILL_S: how long it is watched for a motion, s.
-_SETTLES_S: Final = 1.0
-_STILL_S: Final = 0.5
+_SETTLES_S: Final = 1.0  # how long a device may settle in a state of rest, s
+_STILL_S: Final = 0.5  # how long the device is watched for a motion, s
 # Standard deviations of a reading that are noise.
 _SIGMAS: Final = 6.0
 # Tries of an operation that comes too late for a state that changes by itself.
@@ -98,7 +97,7 @@ class _Walker:
         self._api, self._map, self._clock = api, states, clock
         self._binding: Binding = binding_of(api)
         self._tried: Counter[tuple[str, str]] = Counter()
-        # By state and operation: the state that followed, by the map or as observed; "": none.
+        # The state that followed, by state and operation: from the map or as observed; empty if none did.
         self._led: dict[tuple[str, str], str] = {}
         self.steps: list[Step] = []
         self.rests: list[Rest] = []

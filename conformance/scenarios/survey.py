@@ -513,7 +513,7 @@ def survey(api: RestInterface, values: Values) -> Survey:
     api.values = values
     first = sorted((item for item in operations if item.method != "DELETE"), key=order_of)
     steps = {operation.label: surveyor.explore(operation) for operation in first}
-    # Things were created and files stored meanwhile. Other operations still need what DELETE removes.
+    # By now things and files exist. Explore other operations with them before DELETE removes them.
     needing = [item for item in first if item.parameter("path") or not item.safe]
     later = {f"{item.label} again": surveyor.explore(item, again=True) for item in needing}
     deletes = sorted((item for item in operations if item.method == "DELETE"), key=lambda item: -len(item.template))

@@ -17,8 +17,7 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener
 
-# Most values of one parameter that are remembered, and most requests that a stop with parameters becomes.
-_MOST: Final = 64
+_MOST: Final = 64  # most remembered values of one parameter, and most requests of a stop with parameters
 _REFUSED: Final = range(400, 500)  # statuses of a refused request
 # Values that the device refused and that are remembered, for each parameter.
 _MOST_REFUSED: Final = 8

@@ -55,10 +55,11 @@ _REMOVES: Final = re.compile(r"\b(?:delet|remov|eras|destroy|discard|purg|unregi
 _HIDES: Final = re.compile(
     r"\b(?:cancel|abort|archiv|deactivat|disabl|retir|soft|restor|undelet|revok|marke?[ds]? as)", re.IGNORECASE
 )
-# _IS_GONE: nothing is left after a DELETE. _AGAIN: what is deleted again is answered 404.
+# Phrases in a description: after a DELETE nothing is left.
 _IS_GONE: Final = re.compile(
     r"\b(?:is|are) gone\b|\bread\w*\b[^.;]*\b(?:404|410)\b|\bno list (?:has|shows|names)\b", re.IGNORECASE
 )
+# Phrases in a description: a second DELETE is answered 404.
 _AGAIN: Final = re.compile(r"\bdelet\w*\b[^.;]*\b(?:again|twice|second time)\b[^.;]*\b(?:404|410)\b", re.IGNORECASE)
 # Phrases in a description: a write has no effect yet or GET shows the effect; a device converts a value to store it.
 _LATE: Final = re.compile(

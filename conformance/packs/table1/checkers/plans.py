@@ -29,8 +29,7 @@ _TOLERANCE_M: Final = 0.1  # default tolerance, m
 _FRAME: Final = "map"
 _YAW_OFF_RAD: Final = 0.2
 _ROUNDING_M: Final = 1e-6
-# By media type: requirements on a plan's end, start, frame and given start; the last is SOAP's. YAML would take too
-# long.
+# Requirements on a plan's end, start, frame and given start, by media type; the last is SOAP's. YAML takes too long.
 _JUDGED: Final = {
     "application/json": (
         "rest-resources/plan-end",

@@ -120,7 +120,7 @@ def interfaces_in_motion(robot: Robot, subscribers: SoapService) -> tuple[StateR
     make_room(robot)
     drive = Drive(robot)
     reads: list[StateRead] = []
-    # By state and kind of change: the differences that every first reading has had so far; None: not read yet.
+    # The differences in all first readings so far, by state and kind of change; None if not read yet.
     suspects: dict[tuple[str, bool], StateRead | None] = {
         (name, moves): None for name in STATES for moves in (True, False)
     }
