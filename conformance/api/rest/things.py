@@ -92,7 +92,7 @@ _CHOSEN_NUMBER: Final = 987_001
 _ITEMS = 2  # items that are added to a list of objects, made from its first one
 _MANY = 12  # the same, where the schema has maxItems or minItems
 _PART: Final = 0.375  # is added to numbers that may have a fraction
-_ELSEWHERE: Final = "-05:00"  # offset of a distant time zone
+_ELSEWHERE: Final = "-03:30"  # offset of a time zone, with minutes
 _NEAR: Final = {"rel_tol": 0.02, "abs_tol": 0.01}
 _EQUAL: Final = {"rel_tol": 1e-15}
 _SECOND: Final = 1.0
@@ -272,7 +272,7 @@ def _others(schema: Schema, value: Any, turn: int, collections: frozenset[str]) 
         middle = sum(bounds) // 2 if len(bounds) > 1 else value + turn + 1
         found = [*bounds, *([middle + _PART] if "number" in kinds else []), middle]
     elif not found and isinstance(value, str) and (form or "pattern" not in given):
-        dated = FORMATS.get(form, "").replace("-01-31", f"-02-{turn % 20 + 1:02}").replace("someone@", f"one{turn}@")
+        dated = FORMATS.get(form, "").replace("-01-31", f"-02-{turn % 20 + 1:02}").replace("someone@", f"One{turn}@")
         # A device in one time zone has clients in others.
         dated = dated.replace("Z", _ELSEWHERE) if form == "date-time" and turn % 2 else dated
         found = [dated] if form else [f"roaas {turn}", f"r{turn}"]

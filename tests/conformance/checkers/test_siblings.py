@@ -5,6 +5,7 @@ import json
 import pytest
 from small_device import REFUSED, answers, contract_of, described
 
+from conformance.api.rest.things import another
 from conformance.checkers.rest import RestCheckers
 from conformance.transport.exchange import Exchange, Request, Response
 
@@ -109,3 +110,10 @@ def test_a_write_that_changes_another_thing_is_blamed(contract, name):
 @pytest.mark.parametrize("name", _RIGHT)
 def test_things_that_move_or_have_their_own_values_are_not(contract, name):
     assert _blamed(contract, _RIGHT[name]) == set()
+
+
+def test_other_values_show_a_lost_offset_and_a_lost_case():
+    parts = {"until": {"type": "string", "format": "date-time"}, "mail": {"type": "string", "format": "email"}}
+    made = another({"properties": parts}, {"until": "2026-01-31T12:00:00Z", "mail": "a@example.com"}, 1, frozenset())
+    # Minutes of the offset, and the part of an address whose case counts (RFC 5321 2.4).
+    assert made == {"until": "2026-02-02T12:00:00-03:30", "mail": "One1@example.com"}
