@@ -98,7 +98,8 @@ class Command(NamedTuple):
         name, to = self.leads or ("", "")
         told = str(object_in(answer, {plain_name(one) for one in now}).get(name, to))
         # What is on its way says so.
-        is_astray = told == now.get(name) and not told.endswith("ing") and told.casefold() not in FINAL
+        is_waiting = told.endswith("ing") or plain_name(told) in _WAITING
+        is_astray = told == now.get(name) and not is_waiting and told.casefold() not in FINAL
         is_old = told == before.get(name) and now.get(name) == to
         return told if told != to and (is_astray or is_old) and before.get(name) != to else ""
 

@@ -456,7 +456,8 @@ class Writes:
             # A device may leave out what is there twice, and sort texts.
             is_fewer = set(now) < set(value) or (set(now) > set(value) and name == WHOLE)
             pairs = zip(*(sorted(items, key=str.casefold) for items in (value, now)), strict=False)
-            is_fewer |= len(now) == len(value) and any(is_altered(name, inner, *pair) for pair in pairs)
+            said = {**inner, "description": f"{inner.get('description', '')} {part.get('description', '')}"}
+            is_fewer |= len(now) == len(value) and any(is_altered(name, said, *pair) for pair in pairs)
         return f"{clip(now)} as {name}" if is_other or is_fewer else ""
 
     def _left_out(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:

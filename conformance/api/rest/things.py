@@ -427,13 +427,15 @@ def is_reordered(value: Any, now: Any, part: Any) -> bool:
 
 
 def is_altered(name: str, part: Schema, value: str, now: str) -> bool:
-    """Return whether a free text reads without leading zeros, letters' case, accents or signs, or with other lines.
+    """Return whether a free text reads without leading zeros, accents or signs, or with other lines.
 
-    White space at its ends and the form of combining marks are free, and the case of what is compared without it.
+    White space at its ends and the form of combining marks are free. Case is too, unless the description says that the
+    text is stored as it is.
     """
     is_free = is_free_text(part) and not (_is_converted(part) or _CASELESS.search(plain_name(name)))
     apart = [" ".join(unicodedata.normalize("NFC", text).split()) for text in (value, now)]
     plain = ["".join(one for one in unicodedata.normalize("NFKD", text) if one.isascii()) for text in (value, now)]
+    apart = apart if says_exactly(part) else [text.casefold() for text in apart]
     is_same = _letters(plain[0]) == _letters(plain[1]) != "" and apart[0] != apart[1]
     is_broken = _ZEROS.sub("", value) == _ZEROS.sub("", now) or value.splitlines() == now.splitlines()
     return value != now and (is_broken or (is_free and is_same))

@@ -13,6 +13,8 @@ _PARTS = {
     "note": {"type": ["string", "null"], "maxLength": 500},
     "title": {"type": "string", "description": "Kept in lower case."},
     "email": {"type": "string"},
+    "motto": {"type": "string", "description": "Kept as written."},
+    "signs": {"type": "array", "items": {"type": "string"}, "description": "Kept as written."},
     "scheduled_at": {"type": "string", "format": "date-time"},
     "exact": {"type": "number", "format": "double"},
     "from": {"type": "string", "format": "date-time"},
@@ -133,9 +135,9 @@ BROKEN = {
     "a number that is the same whatever is sent": (
         [_put(**{**_WHOLE, "count": count}, told={"count": 5}) for count in (1, 5, 9)], READ,
     ),
-    "a text in lower case": ([_get(), _put(**{**_WHOLE, "note": "Big Zoë"}), _get(note="big zoë")], READ),
+    "a text in lower case": ([_get(), _put(**{**_WHOLE, "motto": "Big Zoë"}), _get(motto="big zoë")], READ),
     "a text without accents": ([_get(), _put(**{**_WHOLE, "note": "Big Zoë"}), _get(note="Big Zoe")], READ),
-    "items in lower case": ([_get(), _put(**_WHOLE, words=["B", "a"]), _get(words=["b", "a"])], READ),
+    "items in lower case": ([_get(), _put(**_WHOLE, signs=["B", "a"]), _get(signs=["b", "a"])], READ),
     "a planned time in another zone": (
         [_get(), _put(**{**_WHOLE, "scheduled_at": _EAST}), _get(scheduled_at=_EAST.replace("+02:00", "Z"))], READ,
     ),
@@ -300,6 +302,8 @@ BROKEN = {
 }  # fmt: skip
 #: The same for right devices.
 RIGHT = {
+    "a text in lower case where nothing is said": [_get(), _put(**{**_WHOLE, "note": "Big Zoë"}), _get(note="big zoë")],
+    "items in lower case where nothing is said": [_get(), _put(**_WHOLE, words=["B", "a"]), _get(words=["b", "a"])],
     "a text in lower case, as is said": [_get(), _put(**{**_WHOLE, "title": "Big Zoë"}), _get(title="big zoë")],
     "what is compared without case": [_get(), _put(**{**_WHOLE, "email": "Zoe@X"}), _get(email="zoe@x")],
     "a text without blanks at its ends": [_get(), _put(**{**_WHOLE, "note": " Big  Zoë "}), _get(note="Big Zoë")],

@@ -14,7 +14,12 @@ _SENT = {
     "label": {"type": "string", "minLength": 1, "maxLength": 16},
     "note": {"type": "string", "maxLength": 60},
     "planted_at": {"type": "string", "format": "date-time"},
-    "tags": {"type": "array", "items": {"type": "string", "minLength": 1, "maxLength": 12}, "maxItems": 4},
+    "tags": {
+        "type": "array",
+        "items": {"type": "string", "minLength": 1, "maxLength": 12},
+        "maxItems": 4,
+        "description": "Kept as written.",
+    },
 }
 _PLANT = object_of("id", *_SENT, id={"type": "string", "readOnly": True}, **_SENT)
 _NEW = {**object_of("label", **_SENT), "additionalProperties": False}
