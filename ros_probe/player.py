@@ -59,7 +59,7 @@ _THREADS: Final = 48
 _STEP_S: Final = 0.01
 _LONGEST_S: Final = 60.0
 # For a node to tell its parameters, s.
-_ANSWERS_S: Final = 2.0
+_ANSWERS_S: Final = 10.0
 
 Event = tuple[int, str, Any]
 
@@ -161,7 +161,8 @@ class Player:
 
     def _parameters(self) -> dict[str, Any]:
         found: dict[str, dict[str, Any]] = {}
-        for node in self._graph()["nodes"]:
+        graph = self._graph()
+        for node in (one for one in graph["nodes"] if f"{one}/list_parameters" in graph["services"]):
             listed = self._ask(ListParameters, f"{node}/list_parameters", ListParameters.Request())
             names = listed.result.names if listed else []
             values = names and self._ask(GetParameters, f"{node}/get_parameters", GetParameters.Request(names=names))

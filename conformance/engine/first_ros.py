@@ -40,7 +40,7 @@ _FEW: Final = 4
 _READ_S: Final = 3.0  # deadline of one read, s
 _READS_S: Final = 60.0  # time for all reads, s
 _DISCOVERY_S: Final = 15.0  # longest wait for the graph, s
-_SETTLES_S: Final = 1.0
+_SETTLES_S: Final = 3.0
 # Names that every ROS node has.
 _COMMON: Final = re.compile(r"/(parameter_events|rosout)$|/_|/(get_type_description|\w+_parameters(_atomically)?)$")
 _PARAMETER: Final = re.compile(r"\{[^{}]*\}")  # a parameter in a path

@@ -228,7 +228,10 @@ def test_a_node_holds_parameters_and_refuses_others(players, client):
     assert not done(caller.set_parameters([Parameter("speed", value=0.9)])).results[0].successful
     assert robot.tell("held", node="/lab/base")["values"] == {"speed": 0.7, "count": 2**60 + 1, "key": {"b64": ""}}
     assert [event[1:] for event in robot.heard("/lab/base", 2)] == [["set", {"speed": 0.7}], ["set", {"speed": 0.9}]]
-    told = players[1].tell("parameters")["nodes"]["/lab/base"]
+    until = time.monotonic() + 20
+    while "/lab/base" not in (shown := players[1].tell("parameters")["nodes"]):
+        assert time.monotonic() < until, "the other node does not find it"
+    told = shown["/lab/base"]
     assert {name: told[name] for name in values} == {
         "speed": ["double", 0.7], "count": ["integer", 2**60 + 1], "key": ["byte_array", {"b64": ""}]
     }  # fmt: skip
