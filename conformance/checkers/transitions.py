@@ -6,7 +6,7 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from http import HTTPStatus
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from conformance.api.rest.references import singular
 from conformance.api.rest.statuses import refuses
@@ -57,22 +57,12 @@ _ELSE: Final = re.compile(r"\b(?:an)?other (?:state|status|phase|mode)|\botherwi
 # A phrase for the state to which an operation leads, as in "queued becomes running".
 _BECOMES: Final = re.compile(r"\b(?:becomes?|goes (?:in)?to) `?[\w-]+", re.IGNORECASE)
 _NEGATED: Final = re.compile(r"\b(?:not|never|unless|except|cannot|no)\b", re.IGNORECASE)
-# The states from which an operation leads, and the one to which, as in "planned or paused becomes cancelled".
-_TURNS: Final = re.compile(r"([^.;:]*?)\bbecomes? `?([\w-]+)", re.IGNORECASE)
 # States that a thing leaves by an operation alone.
 _RESTING: Final = frozenset({"paused", "suspended", "draft", "archived"})
 
 
-class _Turn(NamedTuple):
-    """The member with a thing's state, the states from which an operation leads to another one, and that one."""
-
-    name: str
-    start: frozenset[str]
-    to: str
-
-
 class Transitions:
-    """Judges operations by the state that a read before them showed: whether they are refused, and where they lead."""
+    """Judges operations in states in which they are refused by the description, by the read before them."""
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
@@ -88,17 +78,6 @@ class Transitions:
                 }
             )
         }
-        # The state to which each operation leads by its description, and the states before it.
-        self._turns = {
-            operation.label: turn
-            for operation in operations
-            if operation.method == "POST"
-            if (read := self._reads.get(operation.template.rpartition("/")[0])) and (turn := turn_of(operation, read))
-        }
-        self._starts: dict[str, frozenset[str]] = defaultdict(frozenset)
-        for operation in operations:
-            if turn := self._turns.get(operation.label):
-                self._starts[operation.template.rpartition("/")[0]] |= turn.start
         # Operations on a thing that are refused the second time.
         self._once = {one.label for one in operations if one.parameter("path") and ONCE.search(one.text)}
         self._done: set[str] = set()  # paths of those that were accepted
@@ -118,7 +97,6 @@ class Transitions:
             if operation.label in self._once and path in self._done:
                 expected, cause = "a refusal, as it was done before", f"{operation.label} twice"
                 yield occasion.case("description/states", not occasion.response.ok, expected, cause=cause)
-            yield from self._turn(occasion, operation, path.rpartition("/")[0])
             for template, barred in self._barred.get(operation.label, {}).items():
                 yield from self._act(occasion, operation, barred, "/".join(path.split("/")[: template.count("/") + 1]))
         if not refuses(status, operation):
@@ -132,23 +110,6 @@ class Transitions:
                 name = state_member(read)
                 told = state_in(occasion, name) if name else ""
                 self._seen |= {above: {name: told}} if told.casefold() in FINAL else {}
-
-    def _turn(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
-        """Judge the state that the response to an operation shows, where other operations begin in it.
-
-        In any other state, a device may be on its way, or beyond the state to which the operation leads.
-        """
-        turn = self._turns.get(operation.label)
-        if turn is None or occasion.response.status != HTTPStatus.OK:
-            return
-        before, now = self._seen.get(path, {}).get(turn.name), state_in(occasion, turn.name)
-        if before in turn.start and now not in {"", before}:
-            is_other = now != turn.to and now in self._starts[operation.template.rpartition("/")[0]]
-            self._taken[operation.label, f"to {now}"] += is_other
-            if not is_other or self._taken[operation.label, f"to {now}"] >= TWICE:
-                expected = f"{turn.to} as {turn.name}, which {before} becomes by the description"
-                found, cause = f"{now} as {turn.name}", f"{operation.label} {turn.name} becomes"
-                yield occasion.case("description/states", not is_other, expected, found, cause=cause)
 
     def _act(
         self, occasion: Occasion, operation: Operation, barred: dict[str, frozenset[str]], path: str
@@ -211,15 +172,6 @@ def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]
     if (starts | only) and not found[name]:
         found[name] = set(known[name]) - starts - only
     return {member: frozenset(values) for member, values in found.items() if values}
-
-
-def turn_of(operation: Operation, read: Operation) -> _Turn | None:
-    """Return where an operation leads by its description; None if that names no state, or several."""
-    name = state_member(read)
-    states = states_of(read, name) if name else ()
-    said = [one for one in _TURNS.findall(operation.text) if one[1] in states and not _NEGATED.search(one[0])]
-    start = frozenset(state for state in states if len(said) == 1 and word_of(state).search(said[0][0]))
-    return _Turn(name, start, said[0][1]) if start else None
 
 
 def _values_in(predicate: str, words: dict[str, str]) -> set[str]:

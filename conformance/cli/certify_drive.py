@@ -24,9 +24,7 @@ from conformance.target.describing import is_wsdl
 from conformance.target.naming import Judged
 
 if TYPE_CHECKING:
-    from conformance.api.rest.interface import RestInterface
     from conformance.cli.certify_options import CertifyOptions
-    from conformance.engine.finding import Finder
     from conformance.verdict.run import Run
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
@@ -128,6 +126,7 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
     from conformance.engine.finding import plan_of  # noqa: PLC0415
     from conformance.engine.found_positions import PositionFinder  # noqa: PLC0415
     from conformance.engine.found_velocities import VelocityFinder  # noqa: PLC0415
+    from conformance.engine.guarded_finding import find_guarded  # noqa: PLC0415
     from conformance.scenarios.motion.binding import binding_of  # noqa: PLC0415
     from conformance.scenarios.scenario import NotPossibleError  # noqa: PLC0415
     from conformance.target.connecting import connection_of  # noqa: PLC0415
@@ -157,7 +156,10 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
     except NotPossibleError as reason:
         raise StatementError(f"--drive: {reason}") from reason
     finder = VelocityFinder if plan.is_velocity else PositionFinder
-    found = _find(finder(api, binding_of(api), plan), api)
+    try:
+        found = find_guarded(finder(api, binding_of(api), plan), api, partial(click.echo, err=True))
+    except NotPossibleError as reason:
+        raise NotShownError(str(reason)) from reason
     api.client.close()
     text = "\n".join(found.lines)
     for line in ("", "# The motion map that was found:", *found.lines, ""):
@@ -170,34 +172,3 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
         click.echo(f"wrote {options.save_map}", err=True)
     notes = tuple(f"Found by driving: {note}" for note in found.notes)
     return Judged(msgspec.structs.replace(statement, motion_map=motion), judged.contract, (*judged.remarks, *notes))
-
-
-def _find(finder: Finder, api: RestInterface) -> Finder:
-    """Let a finder drive the device, which is stopped however that ends, and return the finder.
-
-    Raises:
-        NotShownError: no map could be found.
-        KeyboardInterrupt: a signal came, which is printed with the state of the device.
-    """
-    from conformance.api.rest.guard import Guard  # noqa: PLC0415 - as above
-    from conformance.api.rest.stops import stop_device  # noqa: PLC0415
-    from conformance.engine.progress import note_signals  # noqa: PLC0415
-    from conformance.scenarios.scenario import NotPossibleError  # noqa: PLC0415
-    from conformance.transport.exchange import NoAnswerError  # noqa: PLC0415
-
-    run, guard, api.stop_device = api.run, Guard(api), finder.halt
-    api.client.connection.before_sending = guard.before_sending
-    with note_signals(run) as interruption:
-        try:
-            return finder.find()
-        except (KeyboardInterrupt, NoAnswerError, NotPossibleError) as ended:
-            interruption.only_record()
-            if run.interrupted or isinstance(ended, NoAnswerError):
-                problem = stop_device(api, partial(click.echo, err=True))
-                click.echo(f"WARNING: {inert(problem)}" if problem else "The device was stopped.", err=True)
-            if run.interrupted:
-                click.echo(f"Interrupted by {run.ended_by}: no map was found, and nothing is judged.", err=True)
-                raise KeyboardInterrupt from ended
-            raise NotShownError(str(ended)) from ended
-        finally:
-            guard.release(stopped=not run.stop_undelivered)

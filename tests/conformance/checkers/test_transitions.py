@@ -109,10 +109,6 @@ _BROKEN = {
     ),
     "started from paused": ([("GET . 200", "paused"), ("POST /start 200", "running")], _STATES),
     "woken from stopped": ([("GET . 200", "stopped"), ("POST /wake 200", "running")] * 2, _STATES),
-    "woken into what another operation starts from": (
-        [("GET . 200", "paused"), ("POST /wake 200", "stopped")] * 2,
-        _STATES,
-    ),
     "scrapped when done": ([("GET . 200", "done"), ("POST /scrap 200", "scrapped")], _STATES),
     "sealed twice": ([("POST /seal 200",), ("GET . 200", "stopped"), ("POST /seal 200",)], _STATES),
     "a refused start counts": (_refused("start", 1, 2, 3), _KEEPS),
