@@ -9,21 +9,33 @@ from subprocess import PIPE, Popen
 import pytest
 from processes import ended
 
-EXAMPLE = Path(__file__).parents[3] / "examples" / "paper_robot" / "paper-robot.toml"
+EXAMPLES = Path(__file__).parents[3] / "examples" / "paper_robot"
 SELECTED = ("read-exact", "read-newest", "write-exact", "once", "refused-nothing")
 #: What the suite judges as the robot.
 PLAYED = (*SELECTED, "goal-once", "goal-outcome", "goal-cancel", "goal-rejected", "lists", "recovers")
 
 
-@pytest.mark.parametrize(("starts", "way", "selected"), [([], "--ros", SELECTED), (["--attach"], "--ros-play", PLAYED)])
-def test_the_reference_robot_passes_by_the_map_of_the_example(tmp_path, domain_id, starts, way, selected):
+@pytest.mark.parametrize(
+    ("example", "starts", "way", "selected"),
+    [
+        ("paper-robot", [], "--ros", SELECTED),
+        ("paper-robot", ["--attach"], "--ros-play", PLAYED),
+        ("soap-reads", ["--attach"], "--ros-play", ("read-exact", "read-fresh", "read-newest", "lists")),
+        ("soap-sends", ["--attach"], "--ros-play", ("write-exact", "once", "order", "refused-nothing")),
+    ],
+)
+def test_the_reference_robot_passes_by_the_map_of_the_example(tmp_path, domain_id, example, starts, way, selected):
     wanted = [f"ros-gateway/{name}" for name in selected]
     command = [sys.executable, "-m", "roaas", "robot", "--rest-port", "0", "--soap-port", "0", *starts, "--domain-id"]
     with Popen([*command, str(domain_id)], stdout=PIPE, text=True) as robot:
         try:
-            url = next(found[1] for line in robot.stdout if (found := re.search(r"rest=(\S+)", line)))
+            urls = next(
+                found.groups() for line in robot.stdout if (found := re.search(r"rest=(\S+) soap=(\S+?)/turtle", line))
+            )
             statement = tmp_path / "robot.toml"
-            text = EXAMPLE.read_text(encoding="utf-8").replace("http://127.0.0.1:7003", url)
+            text = (EXAMPLES / f"{example}.toml").read_text(encoding="utf-8")
+            for usual, url in zip(("http://127.0.0.1:7003", "http://127.0.0.1:5555"), urls, strict=True):
+                text = text.replace(usual, url)
             statement.write_text(text, encoding="utf-8")
             options = [way, "--ros-domain-id", domain_id, "--allow-motion", "--effort", "quick", "--out", tmp_path]
             options += [word for id_ in wanted for word in ("--select", id_)]
