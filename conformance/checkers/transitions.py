@@ -11,7 +11,7 @@ from typing import Any, Final
 from conformance.api.rest.references import singular
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import collection_of
-from conformance.checkers.changes import FINAL, TWICE, reads_of, state_in, states_of, word_of
+from conformance.checkers.changes import FINAL, TWICE, another_of, reads_of, state_in, states_of, word_of
 from conformance.checkers.occasion import MOST_OCTETS, Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import kinds_of
@@ -56,6 +56,13 @@ _STATE_NAMES: Final = frozenset({"state", "status", "phase", "mode"})
 _ELSE: Final = re.compile(r"\b(?:an)?other (?:state|status|phase|mode)|\botherwise\b", re.IGNORECASE)
 # A phrase for the state to which an operation leads, as in "queued becomes running".
 _BECOMES: Final = re.compile(r"\b(?:becomes?|goes (?:in)?to) `?[\w-]+", re.IGNORECASE)
+# Words for other conditions on which an operation is refused, and for the state alone.
+_CONDITION: Final = re.compile(
+    r"\b(?:if|when|while|unless|until|except|only|may|can|as long as|and in|and with|mode|not|never|no)\b",
+    re.IGNORECASE,
+)
+_ON_STATE: Final = re.compile(r"\b(?:state|status|phase)\b", re.IGNORECASE)
+_OTHER: Final = re.compile(r"\b(?:or|another|if|when|while|unless)\b", re.IGNORECASE)
 _NEGATED: Final = re.compile(r"\b(?:not|never|unless|except|cannot|no)\b", re.IGNORECASE)
 # States that a thing leaves by an operation alone.
 _RESTING: Final = frozenset({"paused", "suspended", "draft", "archived"})
@@ -84,6 +91,14 @@ class Transitions:
         # Members of the thing at the last read, by path.
         self._seen: dict[str, dict[str, Any]] = {}
         self._taken: Counter[tuple[str, str]] = Counter()
+        # The states from which it must be accepted, by operation; then things that were refused in one of them.
+        self._starts = {
+            one.label: starts
+            for one in operations
+            if (read := self._reads.get(one.template.rpartition("/")[0])) and (starts := starts_of(one, read))
+        }
+        self._due: dict[str, Occasion] = {}
+        self._refused: dict[str, set[str]] = defaultdict(set)
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
@@ -91,6 +106,7 @@ class Transitions:
         path = occasion.context.target.partition("?")[0].rstrip("/")
         if occasion.request.method in SAFE:
             if occasion.request.method == "GET" and operation is not None:
+                yield from self._judge_refusal(occasion, path)
                 self._read(occasion, operation.template.rstrip("/"), path)
             return
         if operation is not None and occasion.context.usual:
@@ -99,8 +115,10 @@ class Transitions:
                 yield occasion.case("description/states", not occasion.response.ok, expected, cause=cause)
             for template, barred in self._barred.get(operation.label, {}).items():
                 yield from self._act(occasion, operation, barred, "/".join(path.split("/")[: template.count("/") + 1]))
+            self._keep_refusal(occasion, operation, path)
         if not refuses(status, operation):
             self._seen.clear()
+            self._due.clear()
             is_once = operation is not None and operation.label in self._once
             self._done = {*self._done, path} if is_once else set()
             above, template = path.rpartition("/")[0], operation.template.rpartition("/")[0] if operation else ""
@@ -127,6 +145,32 @@ class Transitions:
                     expected = f"a refusal with 409, as the description says where {name} is {state}"
                     found, cause = f"status {occasion.response.status}", f"{operation.label} {name} {state}"
                     yield occasion.case("description/states", not is_taken, expected, found, cause=cause)
+
+    def _keep_refusal(self, occasion: Occasion, operation: Operation, path: str) -> None:
+        """Keep a refusal for the state of a thing from which the operation starts, by its description."""
+        label, above = operation.label, path.rpartition("/")[0]
+        states = self._starts.get(label, frozenset())
+        name = state_member(self._reads[operation.template.rpartition("/")[0]]) if states else ""
+        if self._seen.get(above, {}).get(name) in states:
+            if occasion.response.status == HTTPStatus.CONFLICT and occasion.is_valid:
+                self._due[above] = occasion
+            elif occasion.response.ok:
+                self._starts[label] = frozenset()  # it is accepted at times
+
+    def _judge_refusal(self, occasion: Occasion, path: str) -> Iterator[Case]:
+        """Judge a refusal by the next read, if the thing is in the same state, and others were refused as well."""
+        sent = self._due.pop(path, None)
+        if sent is None or sent.operation is None or not occasion.response.ok:
+            return
+        label = sent.operation.label
+        name = state_member(self._reads[sent.operation.template.rpartition("/")[0]])
+        if state := state_in(occasion, name):
+            is_same = state == self._seen.get(path, {}).get(name) and state in self._starts[label]
+            self._refused[label] |= {path} if is_same else set()
+            if len(self._refused[label]) >= TWICE:
+                expected = f"a status other than 409, as {label} starts from {state} by its description"
+                found = f"status 409, and {state} as {name} before and after it"
+                yield sent.case("description/states", not is_same, expected, found, cause=f"{label} {state} refused")
 
     def _read(self, occasion: Occasion, template: str, path: str) -> None:
         """Record the members of a thing as read."""
@@ -172,6 +216,22 @@ def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]
     if (starts | only) and not found[name]:
         found[name] = set(known[name]) - starts - only
     return {member: frozenset(values) for member, values in found.items() if values}
+
+
+def starts_of(operation: Operation, read: Operation) -> frozenset[str]:
+    """Return the states from which an operation is accepted by its description, if that names no other condition.
+
+    It says "paused becomes running. In every other status: 409", and what it says of 409 is the state alone.
+    """
+    name, text = state_member(read), operation.text
+    states = set(states_of(read, name)) if name and operation.method == "POST" else set()
+    conflict = next(iter(re.split(r"[.;]", operation.conflict)), "")
+    is_on_state = (" " not in conflict or _ON_STATE.search(conflict)) and not _OTHER.search(conflict)
+    if another_of(operation) or _CONDITION.search(text) or not is_on_state:
+        return frozenset()
+    said = [found[1] for found in re.finditer(rf"([^.;:]*?)\b{_BECOMES.pattern[2:]}", text, re.IGNORECASE)]
+    before = {state for state in states if any(word_of(state).search(item) for item in said)}
+    return frozenset(before & (states - barred_by(operation, read).get(name, frozenset())))
 
 
 def _values_in(predicate: str, words: dict[str, str]) -> set[str]:

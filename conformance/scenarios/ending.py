@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import re
 import time
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from conformance.api.call_rules import words_of
@@ -21,8 +22,8 @@ from conformance.api.rest.references import singular, thing_of
 from conformance.api.rest.samples import fits
 from conformance.api.rest.things import collection_of, creator_of, id_member, object_in
 from conformance.api.rest.values import Values
-from conformance.checkers.changes import ENDING, FINAL, another_of, leads_to, state_of
-from conformance.checkers.transitions import state_member
+from conformance.checkers.changes import ENDING, FINAL, TWICE, another_of, leads_to, state_of
+from conformance.checkers.transitions import barred_by, state_member
 from conformance.checkers.untouched import KEEPS, OFTEN
 from conformance.documents.json_schema import is_number, kinds_of
 from conformance.documents.json_text import read_json
@@ -84,6 +85,7 @@ class Ended:
         actions: operations of one of them, those that end it last.
         paths: of those that were cancelled, and left to go on.
         at_s: when that was, s of the monotonic clock.
+        tried: how often an operation was sent in a state in which its description says that it is refused.
     """
 
     read: Operation
@@ -91,6 +93,7 @@ class Ended:
     actions: tuple[Operation, ...]
     paths: tuple[str, ...] = ()
     at_s: float = 0.0
+    tried: Counter[tuple[str, str]] = field(default_factory=Counter)
 
 
 def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
@@ -247,10 +250,11 @@ def look_at_ended(api: RestInterface, values: Values, begun: list[Ended]) -> Non
 
 def _walk(writer: Writer, kind: Ended, path: str, steps: list[Operation]) -> None:
     """Call operations of a thing, and read it before and after each, until it has the expected state."""
-    if not writer.send(kind.read, path).response.ok:
+    found, waits = writer.send(kind.read, path), True
+    if not found.response.ok:
         return
-    waits = True
     for step in steps:
+        _try_barred(writer, kind, path, found)
         at = path.rstrip("/") + step.template[len(kind.read.template.rstrip("/")) :]
         sent = writer.send(step, at)
         if sent.response.status == _CONFLICT and waits and _pauses(step):
@@ -264,10 +268,20 @@ def _walk(writer: Writer, kind: Ended, path: str, steps: list[Operation]) -> Non
             now = members(found, (kind.state,)).get(kind.state)
             return told is None or now == told or str(now).casefold() in FINAL or not found.response.ok
 
-        writer.until(lambda: writer.send(kind.read, path), is_so)
+        found = writer.until(lambda: writer.send(kind.read, path), is_so)
         if KEEPS.search(step.text):
             # Members that change by themselves have changed now too.
             writer.send(kind.read, path)
+
+
+def _try_barred(writer: Writer, kind: Ended, path: str, found: Exchange) -> None:
+    """Send each operation that is refused, by its description, in the state that a thing was just read with."""
+    for action in kind.actions:
+        state = str(members(found, (kind.state,)).get(kind.state))
+        if state in barred_by(action, kind.read).get(kind.state, ()) and kind.tried[action.label, state] < TWICE:
+            kind.tried[action.label, state] += 1
+            writer.send(action, path.rstrip("/") + action.template[len(kind.read.template.rstrip("/")) :])
+            found = writer.send(kind.read, path)
 
 
 def _is_ready(writer: Writer, kind: Ended, path: str) -> bool:

@@ -65,7 +65,7 @@ def _broken(contract, steps):
     for number, (line, *seen) in enumerate(steps):
         method, path, status = line.split()
         shown = dict(zip(("state", "runs", "archived"), seen, strict=False)) or None
-        place = f"/{path}" if path.isdecimal() else f"/1{path.removeprefix('.')}"
+        place = f"/{path}" if path[0].isdecimal() else f"/1{path.removeprefix('.')}"
         exchanges.append(exchange(method, f"{_BASE}/belts{place}", int(status), shown, at_s=float(number)))
     return broken(contract, _BASE, exchanges) & {_STATES, _KEEPS}
 
@@ -78,6 +78,11 @@ def _refused(action, *runs, change=1):
     ]
     steps = [step for pair in pairs for step in pair]
     return [*steps, steps[-1]]
+
+
+def _not(number, action, after="paused"):
+    """Return a refusal of a paused belt, and its state after that."""
+    return (f"GET {number} 200", "paused"), (f"POST {number}/{action} 409",), (f"GET {number} 200", after)
 
 
 _RESUMED = [("GET . 200", "stopped"), ("POST /resume 200", "running")]
@@ -109,6 +114,7 @@ _BROKEN = {
     ),
     "started from paused": ([("GET . 200", "paused"), ("POST /start 200", "running")], _STATES),
     "woken from stopped": ([("GET . 200", "stopped"), ("POST /wake 200", "running")] * 2, _STATES),
+    "two are not woken": ([*_not(1, "wake"), *_not(2, "wake")], _STATES),
     "scrapped when done": ([("GET . 200", "done"), ("POST /scrap 200", "scrapped")], _STATES),
     "sealed twice": ([("POST /seal 200",), ("GET . 200", "stopped"), ("POST /seal 200",)], _STATES),
     "a refused start counts": (_refused("start", 1, 2, 3), _KEEPS),
@@ -130,6 +136,13 @@ _RIGHT = {
     "woken, and at its end already": [("GET . 200", "paused"), ("POST /wake 200", "done")],
     "woken, and answered before": [("GET . 200", "paused"), ("POST /wake 200", "paused")] * 2,
     "laid to rest, and out of order": [("GET . 200", "running"), ("POST /rest 200", "scrapped")] * 2,
+    "one alone is not woken": [("GET . 200", "paused"), ("POST /wake 409",), ("GET . 200", "paused")] * 3,
+    "not woken at times": [
+        ("GET 3 200", "paused"), ("POST 3/wake 200", "running"),
+        *_not(1, "wake"), *_not(2, "wake"),
+    ],
+    "not thawed, perhaps for a mode": [*_not(1, "thaw"), *_not(2, "thaw")],
+    "not resumed, when not paused any more": [*_not(1, "wake", "running"), *_not(2, "wake", "running")],
     "scrapped when stopped": [("GET . 200", "stopped"), ("POST /scrap 200", "scrapped")],
     "resumed from paused": [("GET . 200", "paused"), ("POST /resume 200", "running")] * 2,
     "a count that goes on by itself from then on": [*_refused("start", 1, 2, 3)[:-1], ("GET . 200", "running", 5)],

@@ -65,6 +65,17 @@ class _Jobs:
         job.update(state="running", since=time.monotonic())
         return self.answer(job)
 
+    async def requeue(self, request):
+        job = self.jobs.get(request.match_info["id"])
+        if job is None:
+            return error(404, "no such job")
+        self.shown(job)
+        states = {"a queued one is queued": {"queued", "cancelled"}, "none is queued again": {}}
+        if job["state"] not in states.get(self.fault, {"cancelled"}):
+            return error(409, f"it is {job['state']}")
+        job["state"] = "queued"
+        return self.answer(job)
+
     async def cancel(self, request):
         job = self.jobs.get(request.match_info["id"])
         if job is None:
@@ -107,11 +118,15 @@ def _jobs(style, fault):
             "/jobs/{id}/cancel": {"parameters": [_ID], "post": {"responses": acting}},
         }
     )
+    requeue = {"summary": "A cancelled job becomes queued. In every other state: 409.", "responses": acting}
+    if style.get("again and again"):
+        document["paths"]["/jobs/{id}/requeue"] = {"parameters": [_ID], "post": requeue}
     routes = {
         "/jobs": {"GET": device.every, **({} if style.get("fixed") else {"POST": device.create})},
         "/jobs/{id}": {"GET": device.read},
         "/jobs/{id}/start": {"POST": device.start},
         "/jobs/{id}/cancel": {"POST": device.cancel},
+        "/jobs/{id}/requeue": {"POST": device.requeue},
     }
     return document, routes
 
@@ -195,6 +210,7 @@ _RIGHT = {
     "jobs without a word": (_jobs, {"silent": True, "wrapped": True}),
     "jobs that are cancelled again": (_jobs, {"again": True, "wrapped": True}),
     "a job that is always there": (_jobs, {"fixed": True, "takes": 0.1}),
+    "jobs that are queued again": (_jobs, {"again and again": True, "takes": 30}),
     "racks with what is in them": (_racks, "with what is in it"),
     "racks that may be missing": (_racks, "says nothing"),
 }
@@ -209,6 +225,8 @@ _BROKEN = {
     "cancelled is started": (_jobs, {"fixed": True, "takes": 30}, _FOLLOWS),
     "a refused start counts": (_jobs, {"fixed": True, "takes": 30}, _KEEPS),
     "the end moves": (_jobs, {"takes": 0.02}, _FOLLOWS),
+    "a queued one is queued": (_jobs, {"again and again": True, "takes": 30}, _FOLLOWS),
+    "none is queued again": (_jobs, {"again and again": True, "takes": 30}, _FOLLOWS),
     "a rack in use is gone": (_racks, "", _GONE),
 }
 
