@@ -23,7 +23,7 @@ from conformance.api.rest.listing import (
     page_of,
 )
 from conformance.checkers.occasion import Occasion
-from conformance.checkers.totals import Totals
+from conformance.checkers.totals import Places, Totals
 from conformance.documents.json_schema import is_number, kinds_of
 from conformance.documents.openapi import SAFE
 from conformance.documents.parameters import Parameter, plain_name
@@ -68,7 +68,7 @@ class Lists:
         self._seen: set[int] = set()
         # Values other than the requested one in the items of a response, by operation, parameter and requested value.
         self._others: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
-        self._totals = Totals()
+        self._totals, self._places = Totals(), Places()
         # The greatest number of items so far, by operation and other parameters.
         self._longest: dict[object, int] = defaultdict(int)
         # Numbers of items of lists that no limit cut.
@@ -97,7 +97,7 @@ class Lists:
         """Yield the cases of one exchange."""
         if occasion.request.method not in SAFE:
             self._totals.note_change(occasion.response.received_s)
-            for memory in (self._longest, self._whole, self._missed, self._shown, self._cut):
+            for memory in (self._longest, self._whole, self._missed, self._shown, self._cut, self._places):
                 memory.clear()
         operation = occasion.operation
         listing = listing_of(operation) if operation is not None and operation.method == "GET" else None
@@ -112,7 +112,7 @@ class Lists:
             return
         for judge in (
             self._cuts, self._limit, self._filters, self._bounds, self._includes, self._order, self._totals,
-            self._search, self._misses, _links,
+            self._search, self._misses, self._places, _links,
         ):  # fmt: skip
             yield from judge(occasion, listing, page, sent)
         self._learn(listing, page)

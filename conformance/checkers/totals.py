@@ -239,6 +239,47 @@ class Totals:
         return is_round and shown >= max(_FEWEST_CUT[not has_parts], longest)
 
 
+class Places:
+    """Judges members beside a list that are named as its paging parameters: each names what the device applied."""
+
+    def __init__(self) -> None:
+        # The place that was sent, and the items, by operation, member, its value and the other parameters.
+        self._shown: dict[object, tuple[str, tuple[str, ...]]] = {}
+        self._less: dict[str, set[int]] = defaultdict(set)
+
+    def clear(self) -> None:
+        """Forget all pages: the list may have changed."""
+        self._shown.clear()
+
+    def __call__(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
+        """Yield the cases of one page. A device may apply another limit or place than the request has, and say so."""
+        label, count, total = listing.operation.label, len(page.items), max(page.totals.values(), default=0)
+        around = {plain_name(name): one for part in page.around for name, one in part.items() if type(one) is int}
+        for parameter in (listing.offset, listing.page):
+            told = around.get(plain_name(parameter.name)) if parameter is not None else None
+            if parameter is None or told is None or not count or parameter.name not in sent:
+                continue
+            place, rest = sent[parameter.name], frozenset(pair for pair in sent.items() if pair[0] != parameter.name)
+            other, items = self._shown.setdefault((label, parameter.name, told, rest), (place, page.identities))
+            is_twice = other != place and items != page.identities
+            expected = f"another {parameter.name} than that of the page with {parameter.name}={other}"
+            found, cause = f"{told} as {parameter.name}, with other items", f"{label} {parameter.name} told"
+            yield occasion.case("description/list-pages", not is_twice, expected, found, cause=cause)
+        told = around.get(plain_name(listing.limit.name)) if listing.limit is not None else None
+        if listing.limit is None or told is None or not count:
+            return
+        most, before = listing.most(sent), number_of(sent.get(listing.offset.name, "")) if listing.offset else 0
+        # The page is full, and less than the member says, although there is more.
+        is_less = count == most < told and before + count < total
+        self._less[label] |= {most} if is_less else set()
+        if not is_less or len(self._less[label]) >= _OFTEN:
+            expected = f"{most} as {listing.limit.name}, as many items as the page has of {total}"
+            cause = f"{label} {listing.limit.name} told"
+            yield occasion.case(
+                "description/list-pages", not is_less, expected, f"{told} as {listing.limit.name}", cause=cause
+            )
+
+
 # Phrases in a description of a sum, and of things that a write leaves as they are.
 _SUM: Final = re.compile(r"\b(?:sum|total) of (?:all |the |their )*(\w+)", re.IGNORECASE)
 _COUNTED: Final = re.compile(r"\b(?:how many|number of)\b", re.IGNORECASE)

@@ -34,6 +34,38 @@ def test_a_total_that_is_wrong_now_and_then_is_noticed(tmp_path):
     assert seen.broken == {TOTAL}
 
 
+_PAGED = [(1, 0), (1, 1), (1, 2), (2, 0), (2, 1), (3, 0)]
+
+
+@pytest.mark.parametrize(
+    ("shown", "blamed"),
+    [
+        (lambda limit, offset: (limit, offset), False),
+        (lambda limit, _: (limit, 0), True),
+        (lambda _, offset: (9, offset), True),
+        (lambda limit, offset: (min(limit, 2), offset), False),
+    ],
+    ids=["as it is", "always the first place", "always the same limit", "a lower limit"],
+)
+def test_members_that_are_named_as_paging_parameters(shown, blamed, tmp_path):
+    seen = Seen(tmp_path, [whole("limit"), whole("offset")], _totalled("total"))
+    for limit, offset in _PAGED:
+        told, place = shown(limit, offset)
+        items = VALVES[offset : offset + (min(told, limit))]
+        body = {"items": items, "total": len(VALVES), "limit": told, "offset": place}
+        seen.read(items, body=body, limit=limit, offset=offset)
+    assert ("description/list-pages" in seen.broken) == blamed
+
+
+def test_a_place_that_is_rounded_has_the_same_items(tmp_path):
+    seen = Seen(tmp_path, [whole("limit"), whole("offset")], _totalled("total"))
+    for offset in (0, 1, 2, 3):
+        place = offset - offset % 2
+        body = {"items": VALVES[place : place + 2], "total": len(VALVES), "limit": 2, "offset": place}
+        seen.read(body["items"], body=body, limit=2, offset=offset)
+    assert "description/list-pages" not in seen.broken
+
+
 def test_a_header_and_a_filtered_total_are_judged_alike(tmp_path):
     def many(number):
         return [("X-Total-Count", str(number))]

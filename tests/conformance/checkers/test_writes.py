@@ -53,6 +53,10 @@ def _item(kind, schema):
 _ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
 _PATHS = {
     "/plain": _item("application/json", _SCHEMA),
+    "/nulls": {
+        **_item("application/json", _SCHEMA),
+        "patch": {**_item("application/json", _SCHEMA)["patch"], "summary": "Changes what is given; null is a value."},
+    },
     "/merge": _item(MERGE, _SCHEMA),
     "/steps": _item(STEPS, _STEPS),
     "/things/{id}": {"parameters": [_ID], **_item(MERGE, _SCHEMA)},
@@ -211,6 +215,10 @@ BROKEN = {
     "PUT keeps what is gone by the description": (
         [_get("/said"), _put("/said", **{**_LEFT, "gain": 2.5}), _get("/said", gain=2.5)], DEFAULTS,
     ),
+    "null keeps, although it is a value": (
+        [_get("/nulls"), _patch("/nulls", {"note": None}, note="a"), _get("/nulls")],
+        READ,
+    ),
     "null within an object keeps": (
         [_get("/merge"), _patch("/merge", {"zone": {"a": 3, "b": None}}), _get("/merge", zone={"a": 3, "b": 2})], PATCH,
     ),
@@ -365,6 +373,7 @@ RIGHT = {
     "null for what is readOnly": [_get("/merge"), _patch("/merge", {"built": None}), _get("/merge")],
     "null for what the thing always has": [_get("/needed"), _patch("/needed", {"gain": None}), _get("/needed")],
     "null sets the default": [_get("/merge"), _patch("/merge", {"mode": None}, mode="on"), _get("/merge", mode="on")],
+    "null that is a value": [_get("/nulls"), _patch("/nulls", {"note": None}, note=None), _get("/nulls", note=None)],
     "null in plain JSON": [_get(), _patch("/plain", {"note": None}), _get()],
     "an object merged": [
         *(_get("/merge"), _patch("/merge", {"zone": {"a": 3}}), _get("/merge", zone={"a": 3, "b": 2})),
