@@ -29,6 +29,11 @@ _REFUSED: Final = re.compile(
 _WHILE: Final = re.compile(
     r"\b((?:if|when|while|as long as)\b[^.;:]*),[^.,;:]*\b(?:409|refuse[sd]?|conflict)\b", re.IGNORECASE
 )
+# The same with the only state in which it is accepted, as in "Only while the belt is stopped: 409 otherwise".
+_ONLY_WHILE: Final = re.compile(
+    r"\bonly (?:if|when|while|as long as) ([^.;:,]*)[.;:,] ?(?:(?:otherwise|else),? )?409\b(?! (?:if|when|unless))",
+    re.IGNORECASE,
+)
 # What cannot be done to a thing in some state: "A job that has finished cannot be cancelled", "A cancelled job: 409".
 _CANNOT: Final = re.compile(
     r"([^.;:]*?)\b(?:cannot|can not|can no longer|must not|may not) be\b|\b(an? [\w -]+): 409(?=[.;]|$)", re.IGNORECASE
@@ -121,13 +126,14 @@ class Transitions:
             self._due.clear()
             is_once = operation is not None and operation.label in self._once
             self._done = {*self._done, path} if is_once else set()
-            above, template = path.rpartition("/")[0], operation.template.rpartition("/")[0] if operation else ""
-            read = self._reads.get(template)
-            # A device may reach other states later than it tells them.
-            if operation is not None and read is not None and status == HTTPStatus.OK and operation.shape == read.shape:
-                name = state_member(read)
-                told = state_in(occasion, name) if name else ""
-                self._seen |= {above: {name: told}} if told.casefold() in FINAL else {}
+            for at in (path, path.rpartition("/")[0]) if operation is not None and status == HTTPStatus.OK else ():
+                template = operation.template.rstrip("/") if operation else ""
+                read = self._reads.get(template if at == path else template.rpartition("/")[0])
+                # A device may reach other states later than it tells them.
+                if read is not None and operation is not None and operation.shape == read.shape:
+                    name = state_member(read)
+                    told = state_in(occasion, name) if name else ""
+                    self._seen |= {at: {name: told}} if told.casefold() in FINAL else {}
 
     def _act(
         self, occasion: Occasion, operation: Operation, barred: dict[str, frozenset[str]], path: str
@@ -200,6 +206,7 @@ def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]
     thing, found = singular(collection_of(read.template).rpartition("/")[2]), defaultdict[str, set[str]](set)
     is_own = operation.template.count("{") == read.template.count("{")
     conditions = [found[1] for said in (_REFUSED, _WHILE) for found in said.finditer(operation.text)]
+    conditions += [f"unless {found[1]}" for found in _ONLY_WHILE.finditer(operation.text)]
     # The description of a 409 is a condition itself, if it does not say what is needed.
     conditions += [text for text in re.split(r"[.;:]\s", operation.conflict) if not _NEEDS.search(text)]
     only = {one.lower() for one in _ONLY.findall(operation.conflict)} & known[name].keys() if name and is_own else set()

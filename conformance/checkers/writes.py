@@ -69,8 +69,8 @@ _STAYS: Final = re.compile(
     r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\b(?:keep|kept|stay|remain|unchanged)",
     re.IGNORECASE,
 )
-#: Phrases in a description which say that null is written.
-NULL: Final = re.compile(r"\bnull\b[^.;]* (?:is a value|clears?|removes?|deletes?|unsets?|resets?)\b", re.IGNORECASE)
+# Phrases in a description which say that null is written.
+_NULL: Final = re.compile(r"\bnull\b[^.;]* (?:is a value|clears?|removes?|deletes?|unsets?|resets?)\b", re.IGNORECASE)
 # Members with the time of the last change.
 _CHANGED_AT: Final = re.compile(r"(?:last)?(?:updated|modified|changed|edited)(?:at|on|time|date)?")
 _READ, _PATCH, _OWN = (f"description/{name}" for name in ("written-is-read", "patch", "read-only"))
@@ -428,7 +428,7 @@ class Writes:
             cause, found = f"{change.operation.label} {leaf.name} value", f"{clip(leaf.now)} as {leaf.name}, as before"
             case = occasion.case(_READ, False, expected, found, cause=cause)  # noqa: FBT003
             is_open = "properties" in leaf.part or same(leaf.was, leaf.part.get("default"))
-            is_said = bool(NULL.search(change.operation.text)) and not change.is_merge
+            is_said = bool(_NULL.search(change.operation.text)) and not change.is_merge
             is_put = method == "PUT" and leaf.value in (None, [], {})
             if not is_open and (is_put or (leaf.value is None and is_said)):
                 is_sure = is_said or leaf.value is not None

@@ -36,11 +36,17 @@ def json_text(value: Any) -> str:
         return _object(value.items())
     if isinstance(value, list):
         return "[" + ", ".join(json_text(item) for item in value) + "]"
-    return json.dumps(value, ensure_ascii=False)
+    return _scalar(value)
+
+
+def _scalar(value: Any) -> str:
+    """Return a JSON scalar; half a surrogate pair, which UTF-8 does not have, as its escape (RFC 8259 7)."""
+    text = json.dumps(value, ensure_ascii=False)
+    return json.dumps(value) if any("\ud800" <= one <= "\udfff" for one in text) else text
 
 
 def _object(members: Iterable[tuple[str, Any]]) -> str:
-    return "{" + ", ".join(f"{json.dumps(name, ensure_ascii=False)}: {json_text(item)}" for name, item in members) + "}"
+    return "{" + ", ".join(f"{_scalar(name)}: {json_text(item)}" for name, item in members) + "}"
 
 
 def xml_bytes(value: Any, root: str, like: etree._Element | None = None) -> bytes:

@@ -83,6 +83,7 @@ class Ended:
         read: reads one of them.
         state: the member with its state.
         actions: operations of one of them, those that end it last.
+        changes: a PATCH of one of them.
         paths: of those that were cancelled, and left to go on.
         at_s: when that was, s of the monotonic clock.
         tried: how often an operation was sent in a state in which its description says that it is refused.
@@ -91,6 +92,7 @@ class Ended:
     read: Operation
     state: str
     actions: tuple[Operation, ...]
+    changes: tuple[Operation, ...] = ()
     paths: tuple[str, ...] = ()
     at_s: float = 0.0
     tried: Counter[tuple[str, str]] = field(default_factory=Counter)
@@ -110,7 +112,8 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
         actions = _actions(read, operations) if state and len(read.parameter("path")) == 1 else ()
         if not actions or len(found) >= _KINDS or not collection_of(path):
             continue
-        kind, paths = Ended(read, state, actions), list[str]()
+        changes = [one for key, one in operations.items() if key == ("PATCH", path)]
+        kind, paths = Ended(read, state, actions, tuple(changes)), list[str]()
         begins = [operation for operation in actions if not _ends(operation)][:_BEGINNING]
         ends = [operation for operation in actions if _ends(operation)]
         pauses = list(filter(_pauses, ends))[:1]
@@ -276,7 +279,7 @@ def _walk(writer: Writer, kind: Ended, path: str, steps: list[Operation]) -> Non
 
 def _try_barred(writer: Writer, kind: Ended, path: str, found: Exchange) -> None:
     """Send each operation that is refused, by its description, in the state that a thing was just read with."""
-    for action in kind.actions:
+    for action in (*kind.actions, *kind.changes):
         state = str(members(found, (kind.state,)).get(kind.state))
         if state in barred_by(action, kind.read).get(kind.state, ()) and kind.tried[action.label, state] < TWICE:
             kind.tried[action.label, state] += 1

@@ -28,7 +28,6 @@ from conformance.api.rest.things import (
 )
 from conformance.api.rest.values import Values
 from conformance.checkers.transitions import ONCE, barred_by
-from conformance.checkers.writes import NULL
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
@@ -193,11 +192,6 @@ class _Cycle:
             if write is not None:
                 done.append(write)
                 self.living.remember(thing, write, change)
-                cleared = self.writer.clear(change, self.read, thing.path) if NULL.search(change.text) else None
-                if cleared is not None and cleared.response.ok:
-                    now = members(cleared, thing.kept)
-                    thing.last = cleared
-                    thing.kept = {name: one for name, one in thing.kept.items() if now.get(name) == one}
         thing.life = replace(thing.life, writes=(*thing.life.writes, *done))
         if done:
             self.living.look(done[-1].sent, done[-1].operation, thing)

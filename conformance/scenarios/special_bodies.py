@@ -66,7 +66,8 @@ def special_bodies(
     if MERGE in usual.media_type:
         yield from _nulls(parts, read, now, values, may)
     else:
-        needed = flat(read.shape or {}).get("required", ())
+        shown = parts_of(read.shape or {})
+        needed = [name for name in flat(read.shape or {}).get("required", ()) if not fits(shown.get(name, {}), None)]
         nulls = [name for name in there if name not in needed and there[name] is not None and may(name)]
         yield from ({name: None} for name in nulls[:_NULLS] if fits(parts[name], None))
     # Requests to be refused come first: a value that is already there would show nothing.

@@ -10,16 +10,7 @@ from typing import Any, Final, TypeVar
 from conformance.api.rest.inputs import request_of, usual_inputs, whole_body, with_new_values
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits, other_texts
-from conformance.api.rest.things import (
-    WHOLE,
-    another,
-    as_answered,
-    differences,
-    doubt_of_write,
-    object_in,
-    parts_of,
-    with_items,
-)
+from conformance.api.rest.things import WHOLE, another, as_answered, differences, doubt_of_write, object_in, with_items
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
@@ -260,18 +251,6 @@ class Writer:
                 is_later = sent.response.status == _ACCEPTED
                 return None if is_later else self.read_back(operation, read, path, sent, before=before)
         return None
-
-    def clear(self, operation: Operation, read: Operation, path: str) -> Exchange | None:
-        """Set the members of a thing to null by a PATCH that may, and return the read after it; None without any."""
-        shape = parts_of(read.shape)
-        now = members(self.send(read, path), shape)
-        parts = flat(next(iter(operation.bodies.values())).schema).get("properties", {}) if operation.bodies else {}
-        names = [name for name, one in now.items() if one is not None and {name} <= parts.keys() & shape.keys()]
-        free = [name for name in names if all(fits(of[name], None) for of in (parts, shape))]
-        body = dict.fromkeys(name for name in free if not flat(parts[name]).get("readOnly"))
-        if operation.method != "PATCH" or not body or not self.conditional(operation, read, path, body).response.ok:
-            return None
-        return self.send(read, path)
 
     def conditional(self, operation: Operation, read: Operation, path: str, body: Any = None) -> Exchange:
         """Send a request; if the device wants a condition, send it again with the entity tag that it has now."""

@@ -32,6 +32,10 @@ __all__ = ["INVALID", "UNCLEAR", "VALID"]
 # Characters that a cookie's value may not contain (RFC 6265 4.1.1), and the percent sign, which some servers do not
 # decode.
 _NO_COOKIE = re.compile(r"[^!#-$&-+\--:<-\[\]-~]")
+# Half a surrogate pair in JSON: "unpredictable" (RFC 8259 8.2).
+_HALF = re.compile(
+    rb"\\u[dD][89abAB][0-9a-fA-F]{2}(?!\\u[dD][c-fC-F])|(?<!\\u[dD][89abAB][0-9a-fA-F]{2})\\u[dD][c-fC-F]"
+)
 Headers = Sequence[tuple[str, str]]
 _RULES = {
     "required": "json-missing",
@@ -211,6 +215,8 @@ def json_fault(body: bytes, schema: Schema) -> _Said:
     ):
         if there:
             return INVALID, requirement, text.problem or "no body"
+    if _HALF.search(body):
+        return UNCLEAR, "", ""
     problem = shape_of(schema).problem(text.value)
     if not problem:
         return judged_json(schema, text.value), "", ""

@@ -50,7 +50,9 @@ def _contract(tmp_path_factory):
         for name, text in _SAID.items()
     }
     put = {"summary": "409 if the belt is archived.", "responses": acted}
-    paths["/belts/{id}"] = {"parameters": [_ID], "get": {"responses": {"200": answers(_BELT)}}, "put": put}
+    patch = {"summary": "Only while the belt is stopped: 409 otherwise.", "responses": acted}
+    read = {"responses": {"200": answers(_BELT)}}
+    paths["/belts/{id}"] = {"parameters": [_ID], "get": read, "put": put, "patch": patch}
     begin = {"summary": "Only one belt runs at a time: while one is `running`, 409.", "responses": acted}
     paths["/belts"] = {"post": begin}
     alone = {**acted, "409": {**REFUSED, "description": "Another belt is running"}}
@@ -92,6 +94,7 @@ _BROKEN = {
     "stopped from done": ([("GET . 200", "done"), ("POST /stop 200", "stopped")], _STATES),
     "cleaned while paused": ([("GET . 200", "paused"), ("POST /clean 200", "paused")] * 2, _STATES),
     "written while archived": ([_AWAY, ("PUT . 200", "stopped")], _STATES),
+    "written while cancelled, by the response before": ([("PATCH . 200", "cancelled")] * 2, _STATES),
     "filled while archived": ([_AWAY, ("POST /goods 200",)], _STATES),
     "shipped while archived": ([_AWAY, ("POST /ship 200",)], _STATES),
     "restored while not archived": ([("GET . 200", "stopped", 1, False), ("POST /restore 200",)], _STATES),
@@ -143,6 +146,7 @@ _RIGHT = {
     ],
     "not thawed, perhaps for a mode": [*_not(1, "thaw"), *_not(2, "thaw")],
     "not resumed, when not paused any more": [*_not(1, "wake", "running"), *_not(2, "wake", "running")],
+    "written while it stops": [("PATCH . 200", "running")] * 2,
     "scrapped when stopped": [("GET . 200", "stopped"), ("POST /scrap 200", "scrapped")],
     "resumed from paused": [("GET . 200", "paused"), ("POST /resume 200", "running")] * 2,
     "a count that goes on by itself from then on": [*_refused("start", 1, 2, 3)[:-1], ("GET . 200", "running", 5)],

@@ -34,3 +34,14 @@ def test_null_removes_a_member_of_an_object_beside_a_change(tmp_path):
             removed.append(before["lights"]["level"] != state["lights"]["level"])
     assert removed == [True]
     assert states[-1] == first
+
+
+def test_null_is_written_where_every_response_may_have_it(tmp_path):
+    text = {"type": ["string", "null"]}
+    taken = object_of(name={"type": "string"}, note=text)
+    body, responses = body_of(taken), {"200": answers({**taken, "required": ["name", "note"]})}
+    paths = {"/settings": {"get": {"responses": responses}, "patch": {"requestBody": body, "responses": responses}}}
+    contract = Contract.load(write_described_pack(tmp_path, document := described(paths, "3.1.0"), document))
+    read, change = sorted(operations_of(contract), key=lambda operation: operation.method)
+    bodies = special_bodies(change, read, lambda: {"name": "north", "note": "a"}, Values(), lambda _: True)
+    assert [one for one in bodies if None in one.values()] == [{"note": None}]

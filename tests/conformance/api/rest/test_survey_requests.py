@@ -7,6 +7,7 @@ import pytest
 from conformance.api.rest.inputs import NOTHING, Inputs, request_of, usual_inputs
 from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.samples import fits
+from conformance.api.rest.validity import json_fault
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import (
     Kind,
@@ -305,6 +306,11 @@ def test_odd_values_can_be_sent():
         assert all("\r" not in value and "\n" not in value and "\x00" not in value for _, value in request.headers)
     bodies = [request_of(_MANY, one.inputs).body for one in found]
     assert any(rb"\u0000" in body or b"\0" in body for body in bodies), "a NUL in a text"
+    halves = [body for body in bodies if rb"\ud83e" in body]
+    assert halves, "half a surrogate pair"
+    pair = halves[0].replace(rb"\ud83e", rb"\ud83e\udd16")
+    said = [json_fault(body, {})[0] for body in (halves[0], pair)]
+    assert said == ["unclear", "valid"]
 
 
 def test_inputs_are_replaced_and_left_out():
