@@ -87,7 +87,7 @@ def init_described(path: Path | None, source: str, options: DeviceOptions, *, fo
         connection.trust = trusting(connection, source, api.base_url)
         client = HttpClient(base_url or "", connection)
         domain_id = RosMap({}, domain_id=options.ros_domain_id).domain
-        ros = partial(ros_proposals, domain_id=domain_id, client=client) if options.ros else None
+        ros = partial(ros_proposals, domain_id=domain_id, client=client, is_soap=bool(wsdl)) if options.ros else None
         write_described_statement(path, found, api, Calls(options.allow, options.never), where, ros)
     except (OSError, ProbeError) as error:
         raise StatementError(str(error)) from error
@@ -102,7 +102,7 @@ def _read_wsdl(source: str, options: DeviceOptions) -> Description:
     from conformance.documents.wsdl_pack import services_of, with_messages  # noqa: PLC0415 - lxml takes a while
 
     with TemporaryDirectory() as folder:
-        judged = what_is_judged(source, None, replace(options, out=Path(folder)))
+        judged = what_is_judged(source, None, replace(options, out=Path(folder), ros=False, ros_domain_id=None))
         services = services_of(judged.contract)
         document = with_messages(services, {}) if services else judged.contract.openapi
     return Description(source, document, document, judged.statement.endpoints.rest or "", unread=judged.remarks)

@@ -10,18 +10,17 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from http import HTTPStatus
 from typing import Any, Final, NamedTuple, cast
-from urllib.parse import quote
 
 from conformance.contract.toml_file import basic_string
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.engine.commanded import body_schema, parts_of
-from conformance.engine.first_ros_names import named_in_requests, place_of
+from conformance.engine.first_ros_names import named_in_paths, named_in_requests, place_of
 from conformance.engine.first_ros_parameters import parameters_of
 from conformance.engine.map_text import inline
 from conformance.observe.clock import WALL_CLOCK
@@ -45,6 +44,7 @@ _SETTLES_S: Final = 3.0
 _COMMON: Final = re.compile(r"/(parameter_events|rosout)$|/_|/(get_type_description|\w+_parameters(_atomically)?)$")
 _PARAMETER: Final = re.compile(r"\{[^{}]*\}")  # a parameter in a path
 _CANCELS: Final = re.compile(r"/[^/]*(cancel|abort|stop|preempt)[^/]*/?$")
+_COMMANDS: Final = re.compile(r"(^|[/_])(cmd|commands?)([/_]|$)")
 _STATE: Final = re.compile(r"[/_](state|status|phase)$")
 _SENDS: Final = frozenset({"POST", "PUT", "PATCH"})
 # Names of booleans beside a message, and their value if the message is too old or missing.
@@ -74,7 +74,7 @@ class Graph(NamedTuple):
     ``read`` has what operations returned, by label: the document, or the status of what was no success; ``named`` those
     with values of their parameters, and the ROS names that lists or requests give for them; ``known`` those that a read
     showed, and their keys; ``bodies`` what the body says beside the message. ``is_named``: the graph is one such
-    name, so that a body without declared fields may hold its messages.
+    name, so that a body without declared fields may hold its messages. ``is_soap``: the operations are those of a WSDL.
     """
 
     topics: dict[str, str]
@@ -86,6 +86,12 @@ class Graph(NamedTuple):
     known: dict[str, tuple[Operation, dict[str, Any]]]
     bodies: dict[str, dict[str, str]]
     is_named: bool = False
+    is_soap: bool = False
+
+    def reads(self, one: Operation) -> bool:
+        """Return whether an operation only reads: a GET, or one of a WSDL whose message says nothing."""
+        says = any(at for at, _ in _leaves(body_schema(one) or {}))
+        return one.method == "GET" or (self.is_soap and one.shape is not None and not says)
 
     def only(self, name: str) -> Graph:
         """Return the graph with nothing but one name."""
@@ -148,8 +154,12 @@ class _Proposal:
     guess: str = ""
 
 
-def ros_proposals(operations: Sequence[Operation], domain_id: int, client: HttpClient) -> Iterator[str]:
+def ros_proposals(
+    operations: Sequence[Operation], domain_id: int, client: HttpClient, *, is_soap: bool = False
+) -> Iterator[str]:
     """Yield the lines of a ROS map by the graph of a domain, after each operation that may be called was read once.
+
+    Operations of a WSDL (``is_soap``) are not called.
 
     Raises:
         ProbeError: the suite's node cannot be started.
@@ -178,7 +188,7 @@ def ros_proposals(operations: Sequence[Operation], domain_id: int, client: HttpC
         topics, services, actions = (
             {name: types[name][0] for name in told[kind] if types[name] and not _COMMON.search(name)} for kind in _KINDS
         )
-        named = {one.label: (one, name) for one, name in _with_values(operations, ends, get)}
+        named = {one.label: (one, name) for one, name in named_in_paths(operations, ends, get)}
         # A gateway may have found a node only after the first read.
         again = partial(get, again=True)
         known = {
@@ -200,34 +210,11 @@ def ros_proposals(operations: Sequence[Operation], domain_id: int, client: HttpC
                     at = place_of(again(one), fields)
                     keys = {"topic": name, "type": topics[name]} | ({"at": at} if at else {})
                     known |= {one.label: (one, keys)} if at is not None else {}
-        graph = Graph(topics, services, actions, robot.definition, read, named, known, bodies)
+        graph = Graph(topics, services, actions, robot.definition, read, named, known, bodies, is_soap=is_soap)
         every = {one.label: one for one in (*operations, *(one for one, _ in (*named.values(), *known.values())))}
         yield from _map_lines([*every.values()], graph, domain_id)
     finally:
         robot.close()
-
-
-def _with_values(
-    operations: Sequence[Operation], ends: dict[str, Any], get: Callable[[Operation], Any]
-) -> Iterator[tuple[Operation, str]]:
-    """Yield operations with the values that lists give to the parameters of their paths, and the ROS name of each."""
-    left = [(one.template, one, "") for one in operations if "{" not in one.template]
-    for template, operation, _ in left:
-        value = get(operation) if len(left) < _LEAVES else None
-        lists = [value, *(value.values() if isinstance(value, dict) else ())]
-        for item in (item for found in lists if isinstance(found, list) for item in found if isinstance(item, dict)):
-            texts = [text for text in item.values() if isinstance(text, str)]
-            name = next((text for text in texts if text in ends), "")
-            for other in operations:
-                parameter, end, rest = other.template.removeprefix(f"{template}/{{").partition("}")
-                id_ = next((item[key] for key in (parameter, "id", "name") if isinstance(item.get(key), str)), "")
-                if end and id_ and other.template.startswith(f"{template}/{{"):
-                    made = replace(other, template=f"{operation.template}/{quote(id_, safe='')}{rest}")
-                    way = {"GET": "subscribers"}.get(made.method, "publishers")
-                    if "{" not in rest:
-                        left.append((other.template, made, name))
-                    if name and (rest or way not in ends[name] or ends[name][way]):
-                        yield made, name
 
 
 def _settled_graph(robot: Robot) -> dict[str, Any]:
@@ -247,13 +234,13 @@ def _map_lines(operations: Sequence[Operation], graph: Graph, domain_id: int) ->
     followers: set[str] = set()
     written: set[str] = set()
     # Topics that the gateway publishes come first: another operation hardly reads one of them.
-    for operation in sorted(operations, key=lambda item: item.method == "GET"):
+    for operation in sorted(operations, key=graph.reads):
         if "{" in operation.template or operation.label in graph.known:
             continue
         there = graph.only(graph.named[operation.label][1]) if operation.label in graph.named else graph
         proposal = (
             _goal(operation, operations, there, followers) or _call(operation, there)
-            if operation.method in _SENDS
+            if not graph.reads(operation) and operation.method in _SENDS
             else _lists(operation, there)
         ) or _topic(operation, there, written)
         if proposal:
@@ -287,13 +274,14 @@ def _map_lines(operations: Sequence[Operation], graph: Graph, domain_id: int) ->
 
 
 def _why_not(one: Operation, graph: Graph) -> str:
-    schema = one.shape if one.method == "GET" else body_schema(one)
+    schema = one.shape if graph.reads(one) else body_schema(one)
     if "{" in one.template:
         return "its path has a parameter: write an operation for each value, as in GET /topics/odom"
     if one.method != "GET" and one.method not in _SENDS:
         return "it reads nothing and sends nothing, unless it cancels a goal"
     if schema is None or not any(at for at, _ in _leaves(schema)):
-        return "its schema names no fields"
+        is_list = schema is not None and _items(schema) is not None
+        return "a list, but not of the graph's names, all or of one type" if is_list else "its schema names no fields"
     ends = f"{len(graph.topics)} topics, {len(graph.services)} services and {len(graph.actions)} actions"
     return f"nothing on the graph has its fields, of {ends}"
 
@@ -303,11 +291,11 @@ def _topic(one: Operation, graph: Graph, written: Collection[str]) -> _Proposal 
 
     A declared 404 may be for anything: `absent` is a status that it returned, for want of a message, as it seems.
     """
-    reads = one.method == "GET"
+    reads = graph.reads(one)
     fits = graph.fitting(one.shape if reads else body_schema(one), graph.topics)
     # Partial matches of fields count only if the operation's name also fits.
     fits = {name: fit for name, fit in fits.items() if not fit.lacks or _shared_words(one, name)}
-    name, guess = _best(one, fits, written if reads else ())
+    name, guess = _best(one, fits, written if reads else (), reads=reads)
     if not name:
         return None
     read = graph.read.get(one.label)
@@ -330,7 +318,9 @@ def _failure(one: Operation, at: str, definition: Definition) -> dict[str, Any]:
     return {}
 
 
-def _best(one: Operation, fits: dict[str, Fit], written: Collection[str] = ()) -> tuple[str, str]:
+def _best(
+    one: Operation, fits: dict[str, Fit], written: Collection[str] = (), *, reads: bool = False
+) -> tuple[str, str]:
     """Return the topic, service or action that an operation fits best, and why that is a guess; empty if none fits."""
 
     def rank(name: str) -> tuple[bool, bool, int, float]:
@@ -342,6 +332,8 @@ def _best(one: Operation, fits: dict[str, Fit], written: Collection[str] = ()) -
         return name, f"{', '.join(equal[:_NAMED])} would do as well."
     if name in written:
         return name, "another operation publishes on this topic."
+    if reads and _COMMANDS.search(name):
+        return name, "its name is that of a topic for commands."
     alike = any(fits[other].size == fits[name].size for other in others)
     if name and not _shared_words(one, name) and (alike or fits[name].size < _FEW):
         return name, "the fields agree, but not the name."
@@ -414,17 +406,27 @@ def _states(leaf: Schema) -> dict[str, list[str]]:
 
 
 def _lists(one: Operation, graph: Graph) -> _Proposal | None:
-    """Return the proposal that an operation lists the graph, if its response contains all names of one kind."""
+    """Return the proposal that an operation lists the graph, if its response has all names of a kind, or of a type."""
     for at, leaf in _leaves(one.shape or {}):
         items = _items(leaf)
         members = dict(_leaves(items)) if items else {}
         listed = value_at(graph.read.get(one.label), at)
         for kind, ends in (("topics", graph.topics), ("services", graph.services), ("actions", graph.actions)):
             for name in members if ends and isinstance(listed, list) else ():
-                if {*ends} <= {str(value_at(item, name)) for item in listed}:
+                found = {str(value_at(item, name)) for item in listed}
+                types = {ends.get(one, "") for one in found}
+                of = types.pop() if len(types) == 1 else ""
+                if {*ends} <= found or (of and {one for one, type_ in ends.items() if type_ == of} == found):
                     type_ = next((other for other in members if re.search("type|kind", other)), "")
-                    places = {"at": at, "name": name, "type": type_}
+                    places = {"at": at, "name": name, "type": type_, "of": "" if {*ends} <= found else of}
                     return _Proposal({"lists": kind} | {key: place for key, place in places.items() if place})
+            # An operation of a WSDL was not read: the members of its items suggest what it lists.
+            name = next((other for other in (f"/{kind[:-1]}", "/name") if other in members), "")
+            type_ = next((other for other in members if re.search("type$", other)), "")
+            words = f"{one.template.rpartition('/')[2]} {name}".lower()
+            if graph.is_soap and name and type_ and kind[:-1] in words:
+                keys = {"lists": kind, "at": at, "name": name, "type": type_}
+                return _Proposal(keys, guess="members of its items have these names. If it lists one type, add `of`.")
     return None
 
 

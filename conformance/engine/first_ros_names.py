@@ -1,9 +1,9 @@
-"""Find operations whose requests contain a ROS name: in a query parameter, or in a member of the body."""
+"""Find operations whose requests contain a ROS name: in the path, in a query parameter, or in a member of the body."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 from urllib.parse import quote
@@ -18,6 +18,8 @@ _TYPE: Final = re.compile(r"((message|msg|topic|service|srv|action|data|interfac
 _SPOKEN: Final = {"actions": "action|goal", "services": "service|srv|call"}
 # Operations that are made of one: a large graph has many names.
 _MOST: Final = 20
+# Operations that are read for the values of others' parameters.
+_MOST_READ: Final = 500
 
 
 class Named(NamedTuple):
@@ -57,6 +59,29 @@ def named_in_requests(operations: Sequence[Operation], ends: Mapping[str, dict[s
             elif own:
                 body = {own: name} | {member: type_ for member in texts if _TYPE.fullmatch(member)}
                 yield Named(replace(operation, template=f"{operation.template}#{name}"), name, body)
+
+
+def named_in_paths(
+    operations: Sequence[Operation], ends: dict[str, Any], get: Callable[[Operation], Any]
+) -> Iterator[tuple[Operation, str]]:
+    """Yield operations with the values that lists give to the parameters of their paths, and the ROS name of each."""
+    left = [(one.template, one, "") for one in operations if "{" not in one.template]
+    for template, operation, _ in left:
+        value = get(operation) if len(left) < _MOST_READ else None
+        lists = [value, *(value.values() if isinstance(value, dict) else ())]
+        for item in (item for found in lists if isinstance(found, list) for item in found if isinstance(item, dict)):
+            texts = [text for text in item.values() if isinstance(text, str)]
+            name = next((text for text in texts if text in ends), "")
+            for other in operations:
+                parameter, end, rest = other.template.removeprefix(f"{template}/{{").partition("}")
+                id_ = next((item[key] for key in (parameter, "id", "name") if isinstance(item.get(key), str)), "")
+                if end and id_ and other.template.startswith(f"{template}/{{"):
+                    made = replace(other, template=f"{operation.template}/{quote(id_, safe='')}{rest}")
+                    way = {"GET": "subscribers"}.get(made.method, "publishers")
+                    if "{" not in rest:
+                        left.append((other.template, made, name))
+                    if name and (rest or way not in ends[name] or ends[name][way]):
+                        yield made, name
 
 
 def place_of(document: Any, fields: set[str], at: str = "") -> str | None:

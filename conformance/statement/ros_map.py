@@ -176,6 +176,7 @@ class Acts(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
         cancel: the operation that cancels the goal, a template: "{id}" is the goal's id.
         cancel_body: the cancel body of that request, a template as well.
         rejected: the statuses when the action server rejects a goal; empty means any error, or a state that says so.
+        disconnect: what becomes of a goal when the client that sent it disconnects; None: not judged.
     """
 
     action: Topic
@@ -187,6 +188,7 @@ class Acts(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
     cancel: Call | Literal[""] = ""
     cancel_body: dict[str, Any] = {}
     rejected: tuple[Status, ...] = ()
+    disconnect: Literal["cancels", "goes on"] | None = None
 
 
 class Parameter(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -301,13 +303,17 @@ class RosMap(_Forms, frozen=True):
 
 
 class _Rosbridge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The table ``[ros.rosbridge]``: by name, the types of topics, services and actions used over it."""
+    """The table ``[ros.rosbridge]``: by name, the types of topics, services and actions used over it.
+
+    ``disconnect`` is that of its actions.
+    """
 
     url: Annotated[str, Meta(pattern=r"^wss?://\S+$")]
     subscribe: dict[Topic, MessageType] = {}
     publish: dict[Topic, MessageType] = {}
     call: dict[Topic, ServiceType] = {}
     act: dict[Topic, ActionType] = {}
+    disconnect: Literal["cancels", "goes on"] | None = None
     timeout_s: Positive | None = None
 
     def operations(self) -> Iterator[tuple[str, Operation]]:
@@ -317,6 +323,7 @@ class _Rosbridge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         }  # fmt: skip
         goal: dict[str, Any] = {"id": "/id", "feedback": "/feedback", "result": "/result"}
         goal |= {"cancel": "POST /cancel/{id}", "state": State("GET /goal/{id}", "/status", **words)}
+        goal["disconnect"] = self.disconnect
         fails = {"result": "/values", "failure": Failure("/result", (False,))}
         for kind, key, call, at, said, types, more in (
             (Reads, "topic", "GET /subscribe", "/msg", {"op": "subscribe"}, self.subscribe, {"stream": "rosbridge"}),

@@ -7,10 +7,14 @@ from collections.abc import Sequence
 
 import msgspec
 
+from conformance.rules.ros_gateway.arrivals import Request, counts
 from conformance.scenarios.ros.definition import Definition
+from conformance.scenarios.ros.retries import Retry
 from conformance.scenarios.ros.web import changes, differences, document_of, fields_in, is_success
+from conformance.scenarios.rule import NotTested, Outcome
 from conformance.statement.ros_map import Body, RosMap
 from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Case
 
 
 def differing(exchange: Exchange, value: str, definition: Definition, body: Body, at: str, ros: RosMap) -> str:
@@ -33,6 +37,17 @@ def change_text(content: dict[str, object], sent: str, body: Body) -> str:
     """Return how what arrived is not the message that was sent; empty if it is."""
     found = next(changes(fields_in(content, body), fields_in(json.loads(sent), body)), None)
     return f"{found[0]} is {found[1]} in place of {found[2]}" if found else ""
+
+
+def judge_retry(one: Retry) -> Outcome:
+    """Judge whether equal requests and retries arrived as often as they were accepted."""
+    requests = [Request(key, None, accepted) for key, accepted in one.accepted.items()]
+    _, came, least, most = next(counts(requests, [None] * one.came))
+    if came < least and not one.reliable:
+        return NotTested(f"of {one.how}, some of {one.end} may be lost on the way")
+    number = f"{least} to {most}" if least < most else f"{most}"
+    expected = f"{number} at {one.end} for {one.how}"
+    return Case(least <= came <= most, one.last, expected, f"{came}", f"{one.operation} {one.how}")
 
 
 def fails_as(exchange: Exchange, body: Body, declared: Sequence[int]) -> bool:

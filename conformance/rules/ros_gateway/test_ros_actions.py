@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Final
 
-from conformance.rules.ros_gateway.judging import change_text, differing, fails_as, statuses
+from conformance.rules.ros_gateway.judging import change_text, differing, fails_as, judge_retry, statuses
 from conformance.scenarios.ros.actions import Course, Goal, Goals, Look, action_goals, is_end
 from conformance.scenarios.ros.web import is_success
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
@@ -34,7 +34,9 @@ def once(trace: Goals) -> Iterator[Outcome]:
         if goal.course not in _ACCEPTED or goal.course is Course.SECOND:
             continue
         if not goal.is_ok:
-            yield Case(holds=False, exchange=goal.exchange, expected=f"2xx for a goal {goal.course}", cause="refused")
+            # A response without a state to read may be that of the goal's end.
+            if goal.body.state is not None or goal.course is Course.SUCCEEDS:
+                yield Case(False, goal.exchange, f"2xx for a goal {goal.course}", cause="refused")
             continue
         wanted = 2 if goal.course is Course.FIRST else 1
         goals = [heard for heard in goal.heard if heard.what == "goal"]
@@ -43,6 +45,12 @@ def once(trace: Goals) -> Iterator[Outcome]:
         yield Case(len(goals) == wanted, goal.exchange, expected, f"{len(goals)} goals", cause)
         found = change_text(goals[0].content, goal.value, goal.body) if goals else ""
         yield Case(not found, goal.exchange, "the goal's fields at its server", found, "changed")
+
+
+@rule("ros-gateway/goal-once", on=(action_goals,))
+def goal_repeats(trace: Goals) -> Iterator[Outcome]:
+    """Judge whether of equal requests each is one goal, and a retry with its key none."""
+    yield from map(judge_retry, trace.retries)
 
 
 @rule("ros-gateway/goal-rejected", on=(action_goals,))
@@ -192,6 +200,19 @@ def cancels(trace: Goals) -> Iterator[Outcome]:
             last = goal.looks[-1]
             holds = last.word not in goal.body.state.canceled
             yield Case(holds, last.exchange, f"no cancellation of a goal {goal.course}", last.word, cause="another")
+
+
+@rule("ros-gateway/goal-cancel", on=(action_goals,))
+def disconnects(trace: Goals) -> Iterator[Outcome]:
+    """Judge whether a goal whose client disconnects is canceled, or goes on, as the map says."""
+    for one in trace.left:
+        came = {heard.what for heard in one.heard}
+        if "goal" not in came:
+            yield NotTested("the goal of a client that disconnects did not reach its server")
+            continue
+        cancels, wanted = "cancel" in came, one.body.disconnect == "cancels"
+        expected = f"{'a' if wanted else 'no'} request to cancel at {one.body.action} for a goal whose client left"
+        yield Case(cancels is wanted, one.attempt, expected, "one" if cancels else "none", "disconnect")
 
 
 def _judge_cancel(one: Goal, cancel: Exchange) -> Iterator[Outcome]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from conformance.rules.ros_gateway.arrivals import Request, counts
-from conformance.rules.ros_gateway.judging import change_text, differing, fails_as, statuses
+from conformance.rules.ros_gateway.judging import change_text, differing, fails_as, judge_retry, statuses
 from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.services import ROUNDS, Called, Crowd, Server, Services, is_held, service_calls
 from conformance.scenarios.ros.web import fields_in, is_success
@@ -73,6 +73,7 @@ def once(trace: Services) -> Iterator[Outcome]:
             yield Case(not found, call.attempt, f"the request's fields at {call.body.service}", found, "changed")
     for crowd in trace.crowds:
         yield from _judge_reach(crowd)
+    yield from map(judge_retry, trace.retries)
 
 
 def _judge_reach(crowd: Crowd) -> Iterator[Outcome]:

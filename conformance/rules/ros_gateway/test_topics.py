@@ -9,6 +9,8 @@ from statistics import median_low
 from typing import Final
 
 from conformance.rules.ros_gateway.arrivals import Request, come_though_refused, counts, in_order
+from conformance.rules.ros_gateway.judging import judge_retry
+from conformance.scenarios.ros.retries import Retry
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind
 from conformance.scenarios.ros.topics import (
@@ -19,6 +21,7 @@ from conformance.scenarios.ros.topics import (
     topic_bursts,
     topic_reads,
     topic_refusals,
+    topic_retries,
     topic_writes,
 )
 from conformance.scenarios.ros.web import Difference, changes, differences, document_of, equal, fields_in, is_success
@@ -182,6 +185,12 @@ def once(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
                 yield NotTested(f"of {burst.how}, some of {message.topic} may be lost on the way")
             elif not is_strange:  # else it came, and was changed
                 yield Case(False, message.exchange, expected, f"none on {message.topic}", f"{message.operation} none")
+
+
+@rule("ros-gateway/once", on=(topic_retries,))
+def topic_repeats(trace: tuple[Retry, ...]) -> Iterator[Outcome]:
+    """Judge whether of equal requests each is one message, and a retry with its key none."""
+    yield from map(judge_retry, trace)
 
 
 def _requests_in(bursts: Iterable[Burst], ros: RosMap) -> tuple[list[Request[Sent]], list[dict[str, object]]]:

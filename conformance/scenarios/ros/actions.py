@@ -14,13 +14,15 @@ from typing import Any, Final
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.gateway import Gateway
+from conformance.scenarios.ros.retries import Retry, retries
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.services import NO_PLAY
 from conformance.scenarios.ros.web import TRIES, document_of, gave_up, is_out_of_range, is_success
 from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Acts
-from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import Attempt, Exchange
+from conformance.transport.parallel import crowd
 
 _NEEDS: Final = (Need.REST,)
 _PACE_S: Final = 0.06
@@ -32,6 +34,8 @@ _PARTS: Final = ("Goal", "Result", "Feedback")
 # Reads of a goal after its end.
 _AFTERWARDS: Final = 3
 _MORE_S: Final = 0.3
+# A goal whose client disconnects takes _STAYS_S, s; without a response, the client waits for _GOES_S.
+_STAYS_S, _GOES_S = 3.0, 1.0
 # Delay with which a busy server ends a goal, s.
 _LATE_S: Final = 1.0
 
@@ -104,11 +108,28 @@ class Goal:
 
 
 @dataclass(frozen=True)
+class Left:
+    """A goal whose client disconnected while it ran.
+
+    Attributes:
+        body: the operation's map.
+        attempt: what the client got before it went.
+        heard: what the server got and did.
+    """
+
+    body: Acts
+    attempt: Attempt
+    heard: tuple[Heard, ...]
+
+
+@dataclass(frozen=True)
 class Goals:
     """Goals, and definitions of the parts of an action, by operation and part."""
 
     probes: tuple[Goal, ...]
     definitions: dict[str, Definition]
+    retries: tuple[Retry, ...] = ()
+    left: tuple[Left, ...] = ()
 
 
 @scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
@@ -118,13 +139,18 @@ def action_goals(gateway: Gateway) -> Goals:
         raise NotDeclaredError(NO_PLAY)
     probes: list[Goal] = []
     definitions: dict[str, Definition] = {}
+    retried: list[Retry] = []
+    left: list[Left] = []
     with partial_trace(lambda: Goals(tuple(probes), definitions)):
         for call, body in gateway.of(Acts):
             for part in _PARTS:
                 definitions[f"{call}#{part}"] = gateway.definition(f"{body.type}#{part}")
             with gateway.robot.publishing(body.action):
-                probes.extend(_Sender(gateway, call, body).goals())
-    return Goals(tuple(probes), definitions)
+                sender = _Sender(gateway, call, body)
+                probes.extend(sender.goals())
+                retried.extend(retries(gateway, call, body, prepare=sender.delay))
+                left.extend(sender.leave())
+    return Goals(tuple(probes), definitions, tuple(retried), tuple(left))
 
 
 class _Sender:
@@ -158,6 +184,21 @@ class _Sender:
         self._gateway.robot.tell("forget", name=self._body.action)
         self._serve()
         yield self._reach_server(Course.BACK)
+
+    def delay(self, delay_s: float) -> None:
+        """Have the server carry out the next goal for so long, s."""
+        self._gateway.robot.tell("script", name=self._body.action, script=[{"gap_s": delay_s}, {}])
+
+    def leave(self) -> Iterator[Left]:
+        """Send a goal from a client that disconnects while the goal runs, where the map says what that does."""
+        if self._body.disconnect:
+            self.delay(_STAYS_S)
+            self._gateway.robot.take_heard(self._body.action)
+            made, _ = self._gateway.usual_request(self._call, self._body)
+            attempt = crowd(self._gateway.api.client, [[made]], _GOES_S)[0][0]
+            # The goal, its cancellation and its end.
+            heard = self._gateway.robot.take_heard(self._body.action, 3, _STAYS_S + _MORE_S)
+            yield Left(self._body, attempt, tuple(heard))
 
     def _serve(self) -> None:
         self._gateway.robot.tell("act", action=self._body.action, type=self._body.type, script=[{}])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
@@ -12,9 +13,12 @@ from typing import Any, Final, TypeVar
 import msgspec
 
 from conformance.api.rest.interface import RestInterface
+from conformance.documents.openapi import matching
+from conformance.documents.parameters import Parameter
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.motion.binding import Binding
 from conformance.scenarios.motion.templates import fill
+from conformance.scenarios.reaching import key_of, new_key
 from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.robot import ProbeError, Robot
 from conformance.scenarios.ros.samples import Maker
@@ -22,7 +26,7 @@ from conformance.scenarios.ros.web import document_for, document_of, parameters_
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
 from conformance.statement.motion_calls import NAME
 from conformance.statement.ros_map import KINDS, Acts, Body, Calls, Publishes, Reads, RosMap
-from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing, Response
+from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Outgoing, Response
 from conformance.transport.rosbridge import Subscription
 from conformance.transport.streams import Message, Stream
 from conformance.verdict.run import Run
@@ -218,13 +222,27 @@ class Gateway:
             definition = definition or self.definition(body.type + _PARTS.get(type(body), ""))
             document = document_for(value, definition, body, self.ros)
             values = {**parameters_for(value, body), **values}
-        return self.binding.make(fill(call.partition("#")[0], values), document)
+        made = self.binding.make(fill(call.partition("#")[0], values), document)
+        key = self.key_of(call) if value is not None else None
+        return with_header(made, key.name, new_key(key)) if key and key.required else made
+
+    def key_of(self, call: str) -> Parameter | None:
+        """Return the idempotency key that the description of an operation offers, or None."""
+        contract = self.run.contract if self.binding.syntax == "JSON" and not self.ros.rosbridge else None
+        method, _, path = re.split("[?#]", call)[0].partition(" ")
+        declared = matching(contract, method, path) if contract else None
+        return key_of(declared) if declared else None
+
+    def usual_request(self, call: str, body: Body) -> tuple[Outgoing, dict[str, Any]]:
+        """Return a request with a message that differs from all others, and that message."""
+        value = self.usual(body.type + _PARTS.get(type(body), ""))
+        return self.request(call, body, value), value
 
     def send_texts(self, call: str, body: Body) -> None:
         """Send an invalid request, if JSON makes one: a gateway that refuses it may treat the next one otherwise."""
         name = body.type + _PARTS.get(type(body), "")
         if self.binding.syntax == "JSON" and not body.places and self.maker(self.definition(name)).has_numbers:
-            made = self.request(call, body, self.usual(name))
+            made, _ = self.usual_request(call, body)
             with suppress(NoAnswerError):
                 self.send(replace(made, body=with_texts(made.body, body)), body.response_s)
 
@@ -276,6 +294,24 @@ class Gateway:
         return self.api.client.send(
             made.method, made.target, headers=made.headers, body=made.body, timeout_s=max(timeout_s, 1.0)
         )
+
+    def attempt(self, made: Outgoing, timeout_s: float) -> Attempt:
+        """Send a request that may get no response in time.
+
+        Raises:
+            NoAnswerError: the connection failed.
+        """
+        try:
+            return self.send(made, timeout_s)
+        except NoAnswerError as none:
+            if none.kind not in {NoAnswer.TIMEOUT, NoAnswer.CIRCUIT_OPEN}:
+                raise
+            return none.unanswered
+
+
+def with_header(made: Outgoing, name: str, value: str) -> Outgoing:
+    """Return a request with this header in place of its own."""
+    return replace(made, headers=(*(pair for pair in made.headers if pair[0] != name), (name, value)))
 
 
 class Silence(Exchange):

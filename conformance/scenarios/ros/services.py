@@ -14,13 +14,14 @@ from typing import Any, Final
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.gateway import CROWD, PACE_S, Gateway
+from conformance.scenarios.ros.retries import Retry, retries
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Maker, Sample
 from conformance.scenarios.ros.web import TRIES, document_of, gave_up, is_out_of_range, is_success
 from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Calls, Lists, Reads
-from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError
+from conformance.transport.exchange import Attempt, Exchange
 from conformance.transport.parallel import crowd, meanwhile
 from conformance.verdict.effort import Effort
 
@@ -178,6 +179,7 @@ class Services:
     responses: dict[str, Definition]
     crowds: tuple[Crowd, ...] = ()
     clients: tuple[Clients, ...] = ()
+    retries: tuple[Retry, ...] = ()
 
 
 @scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
@@ -189,6 +191,7 @@ def service_calls(gateway: Gateway, effort: Effort) -> Services:
     responses: dict[str, Definition] = {}
     crowds: list[Crowd] = []
     clients: list[Clients] = []
+    retried: list[Retry] = []
     with partial_trace(lambda: Services(tuple(probes), responses)):
         for call, body in gateway.of(Calls):
             request = gateway.definition(f"{body.type}#Request")
@@ -197,8 +200,9 @@ def service_calls(gateway: Gateway, effort: Effort) -> Services:
                 caller = _Caller(gateway, call, body, request, responses[call])
                 probes.extend(caller.calls(effort))
                 clients.append(caller.in_a_row(_ROW[effort.name]))
+                retried.extend(retries(gateway, call, body, prepare=caller.delay))
                 crowds.append(caller.of_many(_FEW if effort.name == "quick" else CROWD))
-    return Services(tuple(probes), responses, tuple(crowds), tuple(clients))
+    return Services(tuple(probes), responses, tuple(crowds), tuple(clients), tuple(retried))
 
 
 class _Caller:
@@ -236,9 +240,9 @@ class _Caller:
         robot, body = self._gateway.robot, self._body
         robot.tell("script", name=body.service, script=[{"answer": {}}])
         made = self._gateway.request(self._call, body, self._complete("Request", {}))
-        attempt, before = self._send(made, body.within_s + _LATE_S), robot.count_clients(body.service)
+        attempt, before = self._gateway.attempt(made, body.within_s + _LATE_S), robot.count_clients(body.service)
         for _ in range(number):
-            attempt = self._send(made, body.within_s + _LATE_S)
+            attempt = self._gateway.attempt(made, body.within_s + _LATE_S)
         # A client that leaves late leaves all the same.
         until = WALL_CLOCK.now() + body.within_s
         while (more := robot.count_clients(body.service) - before) > 1 and WALL_CLOCK.now() < until:
@@ -259,6 +263,11 @@ class _Caller:
         attempts = [(self._outcome(one),) for (one,) in crowd(self._gateway.api.client, made, body.within_s + _LATE_S)]
         heard = tuple(robot.take_heard(body.service, 2 * number, _MORE_S))
         return Crowd(self._call, body, tuple(map(json.dumps, requests)), tuple(one for (one,) in attempts), heard)
+
+    def delay(self, delay_s: float) -> None:
+        """Have the server respond to the next call so late, s."""
+        script = [{"answer": {}, "delay_s": delay_s}, {"answer": {}}]
+        self._gateway.robot.tell("script", name=self._body.service, script=script)
 
     def _serve(self, script: list[dict[str, Any]]) -> None:
         self._gateway.robot.tell("serve", service=self._body.service, type=self._body.type, script=script)
@@ -299,7 +308,9 @@ class _Caller:
         robot, body = self._gateway.robot, self._body
         request = self._complete("Request", request)
         robot.take_heard(body.service)
-        attempt = self._outcome(self._send(self._gateway.request(self._call, body, request), body.within_s + _LATE_S))
+        attempt = self._outcome(
+            self._gateway.attempt(self._gateway.request(self._call, body, request), body.within_s + _LATE_S)
+        )
         ended = WALL_CLOCK.now()
         heard = () if answer is None else tuple(robot.take_heard(body.service, 3, _MORE_S))
         text = "" if answer is None else json.dumps(answer)
@@ -312,19 +323,11 @@ class _Caller:
             return attempt
         made = self._gateway.following(attempt, self._body, state.read, state.body)
         while made is not None:
-            attempt = self._send(made, self._body.within_s)
+            attempt = self._gateway.attempt(made, self._body.within_s)
             if not runs(attempt, self._body) or WALL_CLOCK.now() > until:
                 break
             WALL_CLOCK.sleep(PACE_S)
         return attempt
-
-    def _send(self, made: Any, timeout_s: float) -> Attempt:
-        try:
-            return self._gateway.send(made, timeout_s)
-        except NoAnswerError as none:
-            if none.kind not in {NoAnswer.TIMEOUT, NoAnswer.CIRCUIT_OPEN}:
-                raise
-            return none.unanswered
 
     def _never_answered(self) -> Called:
         """Call a server that never responds, and read other resources until the gateway gives the call up."""
@@ -353,6 +356,6 @@ class _Caller:
     def _read(self, call: str, read: Reads | Lists, usual: float) -> Beside:
         began = WALL_CLOCK.now()
         made = self._gateway.binding.make(call, None) if isinstance(read, Lists) else self._gateway.request(call, read)
-        attempt = self._send(made, self._body.within_s + 2 * _LATE_S)
+        attempt = self._gateway.attempt(made, self._body.within_s + 2 * _LATE_S)
         ended = WALL_CLOCK.now()
         return Beside(call, attempt, ended - began, usual, ended)

@@ -15,6 +15,7 @@ import msgspec
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.gateway import CROWD, PACE_S, PATIENCE_S, Gateway
+from conformance.scenarios.ros.retries import Retry, retries
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Sample
 from conformance.scenarios.ros.web import (
@@ -263,7 +264,13 @@ def topic_refusals(gateway: Gateway) -> tuple[Burst, ...]:
     return tuple(_bursts(gateway, lambda writer: writer.send_malformed()))
 
 
-def _bursts(gateway: Gateway, of: Any) -> Iterator[Burst]:
+@scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
+def topic_retries(gateway: Gateway) -> tuple[Retry, ...]:
+    """Send equal messages and retries to the gateway, and count what it publishes."""
+    return tuple(_bursts(gateway, lambda writer: retries(gateway, writer.call, writer.body, reliable=writer.reliable)))
+
+
+def _bursts(gateway: Gateway, of: Any) -> Iterator[Any]:
     gateway.need_permission()
     for call, publishes in gateway.of(Publishes):
         writer = _Writer(gateway, call, publishes)

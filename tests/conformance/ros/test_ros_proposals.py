@@ -16,7 +16,7 @@ from toy_server import serving
 from ros_probe.process import ProbeError, RosProcess
 
 #: What no description says.
-UNSAID = ("max_age_s", "rejected", "refused", "timeout_s")
+UNSAID = ("max_age_s", "rejected", "refused", "timeout_s", "disconnect")
 #: Parameters of the nodes, so that a read shows which is which.
 HELD = {
     "/base": {"max_speed": ("double", 0.5), "count": ("integer", 2**53 + 1), "on": ("bool", True)},

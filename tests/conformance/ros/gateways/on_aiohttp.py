@@ -14,6 +14,7 @@ from surface import ACTION, PUBLISHES, READS, SERVICES, STYLES, End, openapi
 
 ros, port = begun("aiohttp")
 routes = web.RouteTableDef()
+_watching: list[asyncio.Task[None]] = []
 _reads, _publishes, _services = ({end.name: end for end in ends} for ends in (READS, PUBLISHES, SERVICES))
 
 
@@ -165,6 +166,12 @@ def _written(name: str, goal: Goal) -> dict[str, Any]:
     }
 
 
+async def _watch(request: web.Request, goal: Goal) -> None:
+    while request.transport and not request.transport.is_closing():  # noqa: ASYNC110 - nothing tells when it closes
+        await asyncio.sleep(0.05)
+    ros.cancel(goal)
+
+
 @routes.post("/ros/navigate/goals")
 async def begin(request: web.Request) -> Any:
     """Send a goal."""
@@ -173,6 +180,8 @@ async def begin(request: web.Request) -> Any:
     name, goal, accepted = sent or ("", None, None)
     if not await _of(accepted):
         raise _Problem(422, "refused by its server")
+    if "canceled when its client leaves" in ros.faults:
+        _watching.append(asyncio.create_task(_watch(request, goal)))
     return web.json_response(_written(name, goal), status=201, headers={"Location": f"/ros/navigate/goals/{name}"})
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import uvicorn
 from action_msgs.msg import GoalStatus
 from fastapi import FastAPI, HTTPException, Request
-from fastapi.responses import JSONResponse, StreamingResponse
+from fastapi.responses import JSONResponse, Response, StreamingResponse
 from messages import RefusedError, interface, parsed
 from ros_end import Goal, begun
 from surface import ACTION, PARAMETERS, PUBLISHES, READS, SERVICES, STYLES, End, openapi
@@ -23,6 +23,7 @@ _BODY_BYTES = 2_000_000
 ros, port = begun("fastapi")
 app = FastAPI(openapi_url=None)
 _sent: list[str] = []
+_kept: dict[tuple[str, str], Response | None] = {}
 _reads, _publishes, _services, _parameters = (
     {end.name: end for end in ends} for ends in (READS, PUBLISHES, SERVICES, PARAMETERS)
 )
@@ -67,6 +68,26 @@ async def _within(future: Any) -> Any:
         return await asyncio.wait_for(asyncio.wrap_future(future), ros.deadline_s)
     except TimeoutError as error:
         raise HTTPException(504, "the server does not answer") from error
+
+
+@app.middleware("http")
+async def once(request: Request, carry_out: Any) -> Response:
+    """Perform a request with an Idempotency-Key once; what was refused leaves its key free."""
+    key = request.headers.get("idempotency-key")
+    if key is None or "keys ignored" in ros.faults:
+        return await carry_out(request)
+    name = (request.url.path, (await request.body()).decode() if "keys mixed" in ros.faults else key)
+    if name in _kept:
+        return _kept[name] or JSONResponse({"detail": "it is being performed"}, 409)
+    _kept[name] = None
+    came = await carry_out(request)
+    headers = {field: value for field, value in came.headers.items() if field != "content-length"}
+    response = Response(b"".join([part async for part in came.body_iterator]), came.status_code, headers)
+    if came.status_code < 400:
+        _kept[name] = response
+    else:
+        del _kept[name]
+    return response
 
 
 @app.get("/openapi.json")

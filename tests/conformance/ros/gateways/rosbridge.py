@@ -194,6 +194,9 @@ async def _served(ros: RosEnd, connection: ServerConnection) -> None:
         return
     finally:
         writing.cancel()
+        for goal, _ in client.goals.values():
+            if goal.handle and goal.status not in _ENDED and "goals of clients that left" not in ros.faults:
+                ros.cancel(goal)
         for subscription in client.subscriptions.values():
             subscription.end()
 

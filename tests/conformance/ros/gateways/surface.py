@@ -79,6 +79,8 @@ class Style:
     accepted: int = 202
     cancelled: int = 202
     refused: int | None = 409
+    key: str = ""
+    disconnect: str = ""
     states: dict[str, list[Any]] = field(default_factory=dict)
 
 
@@ -91,6 +93,7 @@ _WORDS: dict[str, list[Any]] = {
 STYLES = {
     "fastapi": Style(
         Forms(required=True),
+        key="Idempotency-Key",
         reads="/api/v1/topics/{}",
         read_at="/data",
         publishes="/api/v1/topics/{}",
@@ -122,6 +125,7 @@ STYLES = {
         outcome_at="/outcome",
         accepted=201,
         refused=422,
+        disconnect="goes on",
         cancel="DELETE /ros/{}/goals/{id}",
         cancelled=204,
         topics="/ros",
@@ -235,7 +239,7 @@ def ros_map(style: Style, domain_id: int) -> str:
         "result": style.outcome_at,
         "cancel": style.cancel.replace("{}", ACTION.name),
         "rejected": [style.refused] if style.refused else [],
-    }
+    } | ({"disconnect": style.disconnect} if style.disconnect else {})
     operations[f"GET {style.topics}"] = {
         "lists": "topics",
         "at": style.topics_at,
@@ -251,7 +255,7 @@ def bridge_map(url: str, domain_id: int) -> str:
     of = {"subscribe": READS, "publish": PUBLISHES, "call": SERVICES, "act": (ACTION,)}
     forms = STYLES["node"].forms
     lines = ["[ros]", f"domain_id = {domain_id}", f'non_finite = "{forms.non_finite}"', f'bytes = "{forms.bytes}"']
-    lines += ["[ros.rosbridge]", f"url = {_toml(url)}", f"timeout_s = {2.5 * DEADLINE_S}"]
+    lines += ["[ros.rosbridge]", f"url = {_toml(url)}", f"timeout_s = {2.5 * DEADLINE_S}", 'disconnect = "cancels"']
     lines += [f"{what} = {_toml({end.ros: end.type for end in ends})}" for what, ends in of.items()]
     return "\n".join(lines) + "\n"
 
@@ -274,12 +278,12 @@ def openapi(style: Style) -> dict[str, Any]:
     for end in PUBLISHES:
         done = {style.published: None if style.published == 204 else {"type": "object"}}
         body = _wrapped(style.publish_at, forms.schema(interface(end.type), sent=True))
-        _put(paths, "post", style.publishes.format(end.name), done | _REFUSED, body)
+        _put(paths, "post", style.publishes.format(end.name), done | _REFUSED, body, style.key)
     for end in SERVICES:
         kind = interface(end.type)
         body = _wrapped(style.call_at, forms.schema(kind.Request, sent=True))
         result = _wrapped(style.result_at, forms.schema(kind.Response, sent=False))
-        _put(paths, "post", style.services.format(end.name), {200: result} | _REFUSED | _UNREACHED, body)
+        _put(paths, "post", style.services.format(end.name), {200: result} | _REFUSED | _UNREACHED, body, style.key)
     for end in PARAMETERS if style.parameters else ():
         item, _, array = end.type.partition("_")
         one: dict[str, Any] = {"type": _ITEMS[item]}
@@ -296,7 +300,7 @@ def openapi(style: Style) -> dict[str, Any]:
     goal = _merged(begun, _wrapped(style.feedback_at, feedback), _wrapped(style.outcome_at, outcome))
     body = _wrapped(style.goal_at, forms.schema(kind.Goal, sent=True))
     refused = {style.refused: _ERROR} if style.refused else {}
-    _put(paths, "post", path, {style.accepted: begun} | _REFUSED | refused | _UNREACHED, body)
+    _put(paths, "post", path, {style.accepted: begun} | _REFUSED | refused | _UNREACHED, body, style.key)
     _put(paths, "get", f"{path}/{{id}}", {200: goal, 404: _ERROR})
     method, _, path = style.cancel.replace("{}", ACTION.name).partition(" ")
     done = None if style.cancelled == 204 else {"type": "object"}
@@ -311,7 +315,7 @@ _REFUSED = {400: _ERROR, 413: _ERROR, 415: _ERROR, 422: _ERROR}
 _UNREACHED = {503: _ERROR, 504: _ERROR}
 
 
-def _put(paths: dict[str, Any], method: str, path: str, responses: dict[int, Any], body: Any = None) -> None:
+def _put(paths: Any, method: str, path: str, responses: dict[int, Any], body: Any = None, key: str = "") -> None:
     operation: dict[str, Any] = {"operationId": method + path.replace("/", "_").replace("{", "").replace("}", "")}
     operation["responses"] = {
         str(status): {"description": "a response"} | ({"content": _json(schema)} if schema else {})
@@ -319,6 +323,9 @@ def _put(paths: dict[str, Any], method: str, path: str, responses: dict[int, Any
     }
     if body is not None:
         operation["requestBody"] = {"required": True, "content": _json(body)}
+    if key:
+        operation["parameters"] = [{"name": key, "in": "header", "schema": {"type": "string"}}]
+        operation["responses"].setdefault("409", {"description": "it is being performed", "content": _json(_ERROR)})
     if "{id}" in path:
         operation["parameters"] = [{"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}]
     paths.setdefault(path, {})[method] = operation
