@@ -25,9 +25,11 @@ from conformance.api.rest.values import IDS
 from conformance.checkers.lists import is_cut
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
+from conformance.documents.json_schema import kinds_of
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
 from conformance.verdict.evidence import Case
 
 # Entries of one list that are remembered.
@@ -304,3 +306,76 @@ def _begins(value: Any, seen: Any) -> bool:
         and seen not in {"", value}
         and value.startswith(seen.rstrip(".… "))
     )
+
+
+class Listed:
+    """Judges whether a whole list has each created thing that a read before and one after it find.
+
+    A list may leave out things in some states, and old ones: so it has an older thing in the same states.
+    """
+
+    def __init__(self, contract: Contract) -> None:
+        operations = operations_of(contract) if contract.openapi_path else ()
+        reads = (one for one in operations if one.method == "GET" and collection_of(one.template))
+        # The read of its things, by path template of a list.
+        self._reads = {collection_of(one.template): one for one in reads if listing_of(one) is None}
+        # How many things were created before it, and when, by path; then the states of what reads found since a change.
+        self._made: dict[str, tuple[int, float]] = {}
+        self._there: dict[str, list[Any]] = {}
+        # Lists without a thing, and the fault, by the path of that.
+        self._missed: dict[str, Case] = {}
+        self._lost: dict[str, set[str]] = defaultdict(set)
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        operation, answer, method = occasion.operation, occasion.response, occasion.request.method
+        path = unquote(occasion.context.target.partition("?")[0]).rstrip("/").casefold()
+        template = operation.template.rstrip("/") if operation is not None else ""
+        if method not in SAFE:
+            if not refuses(answer.status, operation):
+                self._there, self._missed = {}, {}
+            read = self._reads.get(template) if answer.status == HTTPStatus.CREATED and method == "POST" else None
+            if read is not None and (id_ := identifier_of(read_json(answer.body).value, read)):
+                made = len(self._made) + 1, answer.received_s
+                self._made |= {f"{path}/{id_}".casefold(): made} if len(self._made) < _MOST else {}
+        elif operation is not None and method == "GET" and answer.ok:
+            above = self._reads.get(collection_of(template))
+            if above is not None and above.template == operation.template and path in self._made:
+                self._there[path] = _states_of(occasion.members(parts_of(above.shape)), above)
+                case = self._missed.pop(path, None)
+                self._lost[template] |= {path} if case is not None else set()
+                yield from [case] if case is not None and len(self._lost[template]) > 1 else []
+            elif template in self._reads and (page := page_of(answer, operation)) is not None:
+                yield from self._list(occasion, operation, path, page)
+
+    def _list(self, occasion: Occasion, operation: Operation, path: str, page: Page) -> Iterator[Case]:
+        """Judge a whole list, and keep what it lacks until a read finds that."""
+        listing, read = listing_of(operation), self._reads[operation.template.rstrip("/")]
+        sent = listing.query_texts(occasion.context.target) if listing is not None else None
+        paging = (
+            {one.name for one in (listing.limit, listing.sort) if one is not None} if listing is not None else set()
+        )
+        if listing is None or sent is None or not sent.keys() <= paging or is_cut(listing, page, sent):
+            return
+        items = {
+            f"{path}/{identifier_of(item, read)}".casefold(): item for item in page.items if isinstance(item, dict)
+        }
+        known = [(self._made.get(key, (0, 0.0))[0], _states_of(item, read)) for key, item in items.items()]
+        there = {key: one for key, one in self._there.items() if key.rpartition("/")[0] == path}
+        there = {key: one for key, one in there.items() if occasion.sent_s - self._made[key][1] > _SETTLES_S}
+        for key, states in there.items():
+            expected, cause = f"a list with {key}, which reads find", f"{operation.label} lacks"
+            if key in items:
+                yield occasion.case("description/created-is-there", True, expected, cause=cause)  # noqa: FBT003
+            elif any(number < self._made[key][0] and states == one for number, one in known):
+                doubt = "" if page.totals else "the list may leave some things out"
+                found = f"{len(items)} items without it"
+                id_ = "description/created-is-there"
+                self._missed[key] = occasion.case(id_, False, expected, found, cause=cause, doubt=doubt)  # noqa: FBT003
+
+
+def _states_of(thing: dict[str, Any], read: Operation) -> list[Any]:
+    """Return the members of a thing that have one of a few values, by which a list may choose."""
+    parts = {name: flat(one) for name, one in parts_of(read.shape).items()}
+    names = (name for name, one in parts.items() if "enum" in one or "boolean" in kinds_of(one))
+    return [thing.get(name) for name in sorted(names)]

@@ -14,7 +14,7 @@ from conformance.checkers.codings import Codings
 from conformance.checkers.commands import Commands
 from conformance.checkers.contents import Contents
 from conformance.checkers.entity_tags import Conditional, EntityTags
-from conformance.checkers.entries import Entries
+from conformance.checkers.entries import Entries, Listed
 from conformance.checkers.identities import Identities, Uniques
 from conformance.checkers.lists import Lists
 from conformance.checkers.memory import Memory
@@ -57,6 +57,7 @@ class Histories:
         self._checkers = (
             Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory, *self._states,
             Uniques(), declared.WriteOnly(), Contents(), Transitions(contract), Sublists(contract), Entries(contract),
+            Listed(contract),
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:

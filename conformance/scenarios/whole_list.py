@@ -18,6 +18,7 @@ from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.documents.writing import json_text
+from conformance.scenarios.list_queries import many_items
 from conformance.scenarios.writing import Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
 from conformance.transport.parallel import send_together
@@ -26,6 +27,7 @@ _PAGES: Final = 5
 _LIMITS: Final = frozenset({"limit", "pagesize", "perpage", "size", "maxresults", "pagelimit"})
 # A server with an undeclared limit returns a multiple of _ROUND items, at least _FEWEST.
 _ROUND, _FEWEST = 5, 10
+_NEWEST: Final = 2  # things that were created, of each collection
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,10 @@ def read_numbers(writer: Writer, lister: Operation | None, path: str) -> None:
 
 
 def read_items(writer: Writer) -> None:
-    """Read the first, the middle and the last item of each list, and the first one again; then all of them at once."""
+    """Read the first, the middle and the last item of each list, and the first one again; then all of them at once.
+
+    What the run has created last is read too, with the longest list between two reads.
+    """
     operations = callable_operations(writer.api)
     for (method, path), item in operations.items():
         lister = operations.get(("GET", collection_of(path))) or next(below_others(operations, "GET", item), None)
@@ -134,6 +139,7 @@ def read_items(writer: Writer) -> None:
             continue
         writer.api.run.limit.check()
         with suppress(NoAnswerError):  # the survey reports a broken connection
+            _read_newest(writer, lister, item, operations.get(("DELETE", path)))
             page = page_of(writer.send(lister).response, lister)
             ids = [id_member(one, item)[1] for one in page.items if isinstance(one, dict)] if page is not None else []
             ids = [one for one in ids if one is not None]
@@ -144,3 +150,16 @@ def read_items(writer: Writer) -> None:
                 writer.send(item, there)
             requests = [(writer.api.client, writer.request(item, there)) for there in paths]
             send_together([requests, requests[::-1]] * (len(paths) > 1))
+
+
+def _read_newest(writer: Writer, lister: Operation, item: Operation, delete: Operation | None) -> None:
+    """Read things that the run has created, the list with as many items as may be, and the things again."""
+    made = writer.values.of(delete, delete.parameter("path")[0])[:_NEWEST] if delete is not None else []
+    listing, name = listing_of(lister), item.parameter("path")[0].name
+    paths = [item.template.replace(f"{{{name}}}", quote(str(id_), safe="")) for id_ in made]
+    if listing is not None and paths and not lister.parameter("path"):
+        for there in paths:
+            writer.send(item, there)
+        writer.send(lister, query=many_items(listing))
+        for there in paths:
+            writer.send(item, there)

@@ -36,6 +36,15 @@ _PATHS |= {
         "delete": {"responses": {"204": {"description": "gone"}, "409": REFUSED}},
     },
 }
+_JOB = {"type": "object", "properties": {"id": {"type": "string"}, "state": {"enum": ["new", "old"]}}}
+_JOBS = {"type": "object", "properties": {"items": {"type": "array", "items": _JOB}, "total": {"type": "integer"}}}
+_PATHS |= {
+    "/jobs": {"get": {"responses": {"200": answers(_JOBS)}}, "post": {"responses": {"201": answers(_JOB)}}},
+    "/jobs/{id}": {
+        "parameters": [{"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}],
+        "get": {"responses": {"200": answers(_JOB)}},
+    },
+}
 _THERE, _READ, _KEPT, _GONE = (
     f"description/{name}" for name in ("created-is-there", "written-is-read", "refused-keeps", "deleted-is-gone")
 )
@@ -146,3 +155,29 @@ def test_a_wrong_list_is_blamed(contract, name):
 @pytest.mark.parametrize("name", _RIGHT)
 def test_a_right_list_is_not(contract, name):
     assert _broken(contract, _RIGHT[name]) == {}
+
+
+def _job(number, state="new"):
+    return {"id": f"j{number}", "state": state}
+
+
+def _read_around(listed, *missing):
+    """Return reads of jobs with a list of some between them, after three were created."""
+    made = [("POST", "/jobs", None, 201, _job(number)) for number in (1, 2, 3)]
+    quiet = [("GET", "/jobs/j1", None, 200, _job(1))] * 5
+    reads = [("GET", f"/jobs/j{number}", None, 200, _job(number)) for number in missing]
+    items = [_job(*one) for one in listed]
+    return [*made, *quiet, *reads, ("GET", "/jobs", None, 200, {"items": items, "total": len(items)}), *reads]
+
+
+@pytest.mark.parametrize(
+    ("listed", "blamed"),
+    [([(1,)], True), ([(1,), (2,), (3,)], False), ([(1,), (2,)], False), ([(1, "old")], False), ([], False)],
+    ids=["the first alone", "all", "one is missing", "those of another state", "none"],
+)
+def test_a_whole_list_has_what_reads_find(contract, listed, blamed):
+    assert _broken(contract, _read_around(listed, 2, 3)) == ({_THERE: False} if blamed else {})
+
+
+def test_a_list_may_leave_out_the_oldest(contract):
+    assert _broken(contract, _read_around([(3,)], 1, 2)) == {}
