@@ -99,6 +99,8 @@ async def _errors_as_json(request: web.Request, handler: Handle) -> web.StreamRe
         return await handler(request)
     except web.HTTPException as raised:
         return error(raised.status, raised.reason)
+    except RecursionError:
+        return error(400, "the JSON is nested too deeply")
 
 
 def application(description: Any, routes: Mapping[str, Mapping[str, Handle]]) -> web.Application:

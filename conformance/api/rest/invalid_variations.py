@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 from conformance.api.rest.inputs import FORM, MULTIPART, NOTHING, Inputs, body_verdict, parameter_verdict
-from conformance.api.rest.samples import alike_and_apart, fits, sample
+from conformance.api.rest.samples import alike_and_apart, beside_pattern, fits, sample
 from conformance.api.rest.validity import INVALID
 from conformance.api.rest.variations import (
     ACCEPT,
@@ -32,6 +32,8 @@ from conformance.documents.representation import flat
 _OTHER_TYPES: Final = ("text/plain", "application/xml")
 # Longest array that is sent: a longer one would test load.
 _MOST_ITEMS: Final = 100
+# Lists in each other, which parsers that call themselves for each do not survive.
+_NESTED: Final = 20_000
 # Response formats that are requested together with a wrong value, at most.
 _FORMATS: Final = 3
 # Why a value is wrong, for the two faults that frameworks refuse for every parameter.
@@ -60,6 +62,8 @@ def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variatio
     yield Variation(Kind.MALFORMED, "a body that is not UTF-8", "body", not_utf8)
     if "object" in kinds_of(body.schema) and len(kinds_of(body.schema)) == 1:
         yield Variation(Kind.INVALID, "a list instead of an object", "body", replace(usual, body=[]))
+        nested = replace(usual, body=b"[" * _NESTED + b"]" * _NESTED)
+        yield Variation(Kind.INVALID, f"{_NESTED:,} lists in each other", "body", nested)
     # A value that one alternative of a union forbids may be allowed by another alternative.
     found = _invalid_parts(usual, usual.body, body.schema, ())
     # A merge patch leaves out what it does not change (RFC 7396).
@@ -169,6 +173,8 @@ def _invalid_values(schema: Schema) -> Iterator[tuple[Any, str]]:
             break
     if kinds & {"number", "integer"} and "string" not in kinds and not fits(schema, value=False):
         yield from ((False, _OTHER_TYPE), (str(math.floor(fraction)), _OTHER_TYPE))
+    elif "boolean" in kinds and not fits(schema, "true"):
+        yield "true", _OTHER_TYPE
 
 
 def _beyond(schema: Schema) -> Iterator[tuple[Any, str]]:
@@ -207,7 +213,7 @@ def _beyond_texts(schema: Schema) -> Iterator[tuple[Any, str]]:
     if isinstance(schema.get("minLength"), int) and 0 < schema["minLength"] <= LONG:
         yield "a" * (schema["minLength"] - 1), "shorter than its minLength"
     if isinstance(schema.get("pattern"), str):
-        yield "~ roaas ~", "which its pattern excludes"
+        yield from ((one, "which its pattern excludes") for one in beside_pattern(schema) or ["~ roaas ~"])
 
 
 def _invalid_fields(usual: Inputs, body: dict[str, Any], schema: Schema) -> Iterator[Variation]:

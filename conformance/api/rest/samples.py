@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+import string
 from collections.abc import Mapping
 from functools import lru_cache
+from itertools import islice
 from typing import Any, Final
 
 from conformance.api.rest.references import is_free_text
@@ -23,6 +25,9 @@ _OPTIONAL = 1_000  # most optional members of a value
 # Most required members and items of a value. Each member gets an equal share, because schemas may refer to
 # each other without end.
 _REQUIRED = 20_000
+_DIGITS: Final = 12  # digits of a text that are varied
+_HIGHER: Final = 2  # texts that have a digit which is too high
+_LONGER: Final = 64  # characters by which a text is lengthened, at most
 #: A valid text for each format that JSON Schema, OpenAPI or its registry names.
 FORMATS: Mapping[str, str] = {
     "uuid": "3fa85f64-5717-4562-b3fc-2c963f66afa6",
@@ -214,6 +219,27 @@ def _matching(encoded: str) -> str:
         return find(from_regex(pattern), lambda text: fits(schema, text) and text.isprintable(), settings=quiet)
     except (HypothesisException, re.error, ValueError):
         return ""
+
+
+def beside_pattern(schema: Schema) -> list[str]:
+    """Return texts that a schema excludes next to those that it allows: a digit higher by one, or a character more."""
+    text = sample(schema)
+    if not isinstance(text, str) or not text or not fits(schema, text):
+        return []
+    places = [place for place, char in enumerate(text) if char in string.digits][:_DIGITS]
+
+    def having(place: int, digit: int) -> str:
+        return f"{text[:place]}{digit}{text[place + 1 :]}"
+
+    for place in places:
+        # The highest digit that is allowed in each place.
+        text = next((one for digit in range(9, 0, -1) if fits(schema, one := having(place, digit))), text)
+    higher = [having(place, int(text[place]) + 1) for place in places[::-1] if text[place] != "9"]
+    longer = (text + number * text[-1] for number in range(1, _LONGER))
+    return [
+        *islice((one for one in higher if not fits(schema, one)), _HIGHER),
+        *islice((one for one in longer if not fits(schema, one)), 1),
+    ]
 
 
 def other_texts(schema: Schema, value: dict[str, Any]) -> dict[str, str]:

@@ -529,7 +529,10 @@ def leaves_of(
     above: str = "",
     of: str = "",
 ) -> Iterator[Leaf]:
-    """Yield the members that were sent and exist now, also in objects and maps; of: name for the entries of a map."""
+    """Yield the members that were sent and exist now, also in objects and maps, and the numbers in lists of objects.
+
+    Entries of a map, and items of a list, have the name ``of``.
+    """
     for name in sent.keys() & now.keys():
         part, value, was, seen = flat(parts.get(name, {})), sent[name], before.get(name), now[name]
         if value and isinstance(value, dict) and isinstance(seen, dict):
@@ -538,6 +541,22 @@ def leaves_of(
             yield from leaves_of(members_in(part, value), value, inner, seen, f"{of or above + name}.", entries)
         else:
             yield Leaf(of or f"{above}{name}", part, value, was, seen)
+            yield from _numbers_in_items(f"an item of {of or above + name}.", part, value, seen)
+
+
+def _numbers_in_items(above: str, part: Schema, value: Any, seen: Any) -> Iterator[Leaf]:
+    """Yield the numbers of a list of objects, where an item differs by fractions alone from the one in its place."""
+    items = part.get("items")
+    if not (_are_objects(value) and _are_objects(seen) and len(value) == len(seen) and isinstance(items, dict)):
+        return
+    parts = flat(items).get("properties", {})
+    for one, other in zip(value, seen, strict=True):
+        numbers = [name for name in one if is_number(one[name]) and is_number(other.get(name))]
+        is_same = one not in seen and all(one[name] == other.get(name) for name in one if name not in numbers)
+        if is_same and all(abs(one[name] - other[name]) < 1 for name in numbers):
+            yield from (
+                Leaf(f"{above}{name}", flat(parts.get(name, {})), one[name], None, other[name]) for name in numbers
+            )
 
 
 def left_out_of(

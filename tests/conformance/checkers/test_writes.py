@@ -20,7 +20,10 @@ _PARTS = {
     "from": {"type": "string", "format": "date-time"},
     "path": {"type": "array", "items": {"type": "number"}},
     "words": {"type": "array", "items": {"type": "string"}},
-    "stops": {"type": "array", "items": {"type": "object", "properties": {"x": {"type": "integer"}}}},
+    "stops": {
+        "type": "array",
+        "items": {"type": "object", "properties": {"x": {"type": "integer"}, "y": {"type": "number"}}},
+    },
     "zone": {"type": "object", "properties": {"a": {"type": "integer"}, "b": {"type": ["integer", "null"]}}},
     "built": {"type": "string", "readOnly": True},
     "level": {"type": "integer", "readOnly": True},
@@ -284,6 +287,10 @@ BROKEN = {
         [_get(), _put(**{**_WHOLE, "gain": -72.5}), _get(gain=-72), _put(**{**_WHOLE, "gain": 3.25}), _get(gain=3)],
         READ,
     ),
+    "fractions in a list of objects are cut off": (
+        [_get(), _put(**_WHOLE, stops=[{"x": 1, "y": 62.5}]), _get(stops=[{"x": 1, "y": 62}]),
+         _put(**_WHOLE, stops=[{"x": 1, "y": 73.25}]), _get(stops=[{"x": 1, "y": 73}])], READ,
+    ),
     "fractions are rounded, by a patch": (
         [_get("/merge"), _patch("/merge", {"gain": 2.75}), _get("/merge", gain=3),
          _patch("/merge", {"gain": 6.5}), _get("/merge", gain=6)], READ,
@@ -414,6 +421,10 @@ RIGHT = {
     ],
     "a patch that is refused": [_get("/steps"), _patch("/steps", _END, 409), _get("/steps")],
     "one fraction is cut off": [_get(), _put(**{**_WHOLE, "gain": 2.5}), _get(gain=2)],
+    "fractions of items that the device sorts": [
+        *(_get(), _put(**_WHOLE, stops=[{"y": 90.5}, {"y": 90}]), _get(stops=[{"y": 90}, {"y": 90.5}])),
+        *(_put(**_WHOLE, stops=[{"y": 97.25}, {"y": 97}]), _get(stops=[{"y": 97}, {"y": 97.25}])),
+    ],
     "steps of a half": [
         *(_get(), _put(**{**_WHOLE, "gain": 2.375}), _get(gain=2.5), _put(**{**_WHOLE, "gain": 3.1}), _get(gain=3)),
         *(_put(**{**_WHOLE, "gain": 4.1}), _get(gain=4)),

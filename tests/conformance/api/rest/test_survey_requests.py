@@ -237,6 +237,28 @@ def test_a_fraction_is_sent_for_each_schema_of_integers_alone(member, fractions)
     assert [value for value in sent if isinstance(value, float) and value % 1] == fractions
 
 
+@pytest.mark.parametrize(
+    ("pattern", "texts"),
+    [
+        ("^([01][0-9]|2[0-3]):[0-5][0-9]$", ["23:69", "24:59", "23:599"]),
+        ("^[A-Z]{2}-[0-9]{5}$", ["AA-999999"]),
+        ("^[0-9]{4,6}$", ["9999999"]),
+        (r"^v\d+$", ["~ roaas ~"]),
+    ],
+)
+def test_texts_next_to_a_pattern_are_sent(pattern, texts):
+    member = {"type": "string", "pattern": pattern}
+    found = _variations(_operation(path="/a", body={"type": "object", "properties": {"n": member}}), invalid_variations)
+    assert [one.inputs.body["n"] for one in found if one.says.endswith("which its pattern excludes")] == texts
+
+
+def test_a_text_for_a_truth_value_is_sent_where_no_text_is_allowed():
+    for kinds, is_sent in (("boolean", True), (["boolean", "string"], False)):
+        body = {"type": "object", "properties": {"n": {"type": kinds}}}
+        found = _variations(_operation(path="/a", body=body), invalid_variations)
+        assert ({"n": "true"} in [one.inputs.body for one in found]) is is_sent
+
+
 def test_items_of_a_body_that_is_a_list():
     found = _variations(_operation(path="/a", body=_NUMBERS), invalid_variations)
     assert [False] in [one.inputs.body for one in found]

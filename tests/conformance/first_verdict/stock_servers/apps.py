@@ -28,7 +28,7 @@ def distance(body: bytes, content_type: str) -> tuple[int, str]:
         return 415, ""
     try:
         value = json.loads(body.decode(), parse_constant=lambda _: None)
-    except ValueError:
+    except (ValueError, RecursionError):
         return 400, ""
     x = value.get("x") if isinstance(value, dict) and len(value) == 1 else None
     fits = isinstance(x, int | float) and not isinstance(x, bool) and -_MOST <= x <= _MOST
