@@ -135,7 +135,7 @@ def read_items(writer: Writer) -> None:
     operations = callable_operations(writer.api)
     for (method, path), item in operations.items():
         lister = operations.get(("GET", collection_of(path))) or next(below_others(operations, "GET", item), None)
-        if method != "GET" or lister is None or len(item.parameter("path")) > 1:
+        if method != "GET" or lister is None or len(item.parameter("path")) != 1:
             continue
         writer.api.run.limit.check()
         with suppress(NoAnswerError):  # the survey reports a broken connection

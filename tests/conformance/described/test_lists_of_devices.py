@@ -6,7 +6,18 @@ import time
 from urllib.parse import urlencode
 
 from aiohttp import web
-from small_device import REFUSED, answers, body_of, certified, described, error, object_of, small_device
+from small_device import (
+    REFUSED,
+    answers,
+    body_of,
+    certified,
+    constant,
+    described,
+    error,
+    object_of,
+    reading,
+    small_device,
+)  # fmt: skip
 
 LIMIT, FILTER, ORDER, TOTAL, PAGES = (
     f"description/list-{name}" for name in ("limit", "filter", "order", "total", "pages")
@@ -289,3 +300,11 @@ def test_each_fault_is_found(tmp_path):
     assert expected <= blamed, expected - blamed
     # What is lost or out of order on a page is so in its total and order too; no limit or filter is blamed for it.
     assert {id_ for _, id_ in blamed - expected} <= {PAGES, ORDER, TOTAL}, blamed - expected
+
+
+def test_a_list_at_the_root_is_none_of_what_is_beside_it(tmp_path):
+    entry = object_of("id", id={"type": "string"})
+    description = described({"/": reading({"type": "array", "items": entry}), "/health": reading(object_of())})
+    routes = {"/": constant([{"id": "health"}]), "/health": constant({"ok": True})}
+    with small_device(description, routes) as url:
+        assert certified(url, tmp_path).blamed == {}
