@@ -10,32 +10,28 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from http import HTTPStatus
-from typing import Any, Final, NamedTuple, cast
+from typing import Any, Final, NamedTuple
 
 from conformance.contract.toml_file import basic_string
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.engine.commanded import body_schema, parts_of
+from conformance.engine.first_ros_fields import FEW, Fit, fields_of, fit_of, items_of, leaves_of, places_of
 from conformance.engine.first_ros_names import named_in_paths, named_in_requests, place_of
 from conformance.engine.first_ros_parameters import parameters_of
 from conformance.engine.map_text import inline
 from conformance.observe.clock import WALL_CLOCK
-from conformance.scenarios.ros.definition import FLOATS, INTEGERS, LONG, Definition, Shape, value_at
+from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.robot import ProbeError, Robot
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import NoAnswerError
 
-# Limits for a schema: fields, levels and objects; and for a comment: names from the graph.
-_LEAVES: Final = 500
-_DEPTH: Final = 8
-_PLACES: Final = 50
+# Names from the graph in a comment.
 _NAMED: Final = 3
-# A message type with fewer fields cannot be recognised by its fields.
-_FEW: Final = 4
 _READ_S: Final = 3.0  # deadline of one read, s
 _READS_S: Final = 60.0  # time for all reads, s
 _DISCOVERY_S: Final = 15.0  # longest wait for the graph, s
@@ -49,9 +45,6 @@ _STATE: Final = re.compile(r"[/_](state|status|phase)$")
 _SENDS: Final = frozenset({"POST", "PUT", "PATCH"})
 # Names of booleans beside a message, and their value if the message is too old or missing.
 _FAILURES: Final = {r"/(is_?)?(stale|outdated|expired)$": True, r"/(success|ok)$": False}
-# The group of values that a letter before an axis stands for, as in qw and vx.
-_LETTERS: Final = {"": "position", "q": "orientation", "v": "linear", "w": "angular"}
-_AXIS: Final = re.compile(r"([qvw]?)([xyzw])")
 _KINDS: Final = ("topics", "services", "actions")  # ends of the graph
 # Names of objects without declared fields, by the part of a goal or call that they contain.
 _HOLDS: Final = {
@@ -90,7 +83,7 @@ class Graph(NamedTuple):
 
     def reads(self, one: Operation) -> bool:
         """Return whether an operation only reads: a GET, or one of a WSDL whose message says nothing."""
-        says = any(at for at, _ in _leaves(body_schema(one) or {}))
+        says = any(at for at, _ in leaves_of(body_schema(one) or {}))
         return one.method == "GET" or (self.is_soap and one.shape is not None and not says)
 
     def only(self, name: str) -> Graph:
@@ -107,42 +100,16 @@ class Graph(NamedTuple):
 
         An object without declared fields has them if its name is that of a ``holder``, or if a list names the end.
         """
-        found, places = {}, _places(schema or {})
-        objects = [at for at, leaf in _leaves(schema or {}) if kinds_of(leaf) == {"object"}]
+        found, places = {}, places_of(schema or {})
+        objects = [at for at, leaf in leaves_of(schema or {}) if kinds_of(leaf) == {"object"}]
         objects = [at for at in objects if (holder.search(at) if holder else self.is_named)]
         for name, type_ in ends.items():
             with suppress(ProbeError):  # the message type is not installed
-                fit = _fit(places, self.definition(type_ + part))
-                fit = Fit(objects[0], {}, _FEW, 0, {}) if objects and not (fit and fit.size) else fit
+                fit = fit_of(places, self.definition(type_ + part))
+                fit = Fit(objects[0], {}, FEW, 0, {}) if objects and not (fit and fit.size) else fit
                 if fit is not None and not (part and fit.lacks):
                     found[name] = fit
         return found
-
-
-@dataclass(frozen=True)
-class Fit:
-    """How a schema has the fields of a message.
-
-    Attributes:
-        at: where the message is.
-        fields: the map's key `fields`; empty if the names are those of the message.
-        size: how many fields both have.
-        lacks: how many fields of the message the schema lacks.
-        forms: how it writes numbers and octets, by key of the map.
-        guess: why it may be another message; or empty.
-    """
-
-    at: str
-    fields: dict[str, str]
-    size: int
-    lacks: int
-    forms: dict[str, str]
-    guess: str = ""
-
-    @property
-    def keys(self) -> dict[str, Any]:
-        """Return the keys of the ROS map that express this fit."""
-        return {name: value for name, value in (("at", self.at), ("fields", self.fields)) if value}
 
 
 @dataclass
@@ -211,6 +178,8 @@ def ros_proposals(
                     keys = {"topic": name, "type": topics[name]} | ({"at": at} if at else {})
                     known |= {one.label: (one, keys)} if at is not None else {}
         graph = Graph(topics, services, actions, robot.definition, read, named, known, bodies, is_soap=is_soap)
+        made = (_by_parameters(one, graph) for one in operations)
+        known |= {one.label: (one, keys) for one, keys in filter(None, made)}
         every = {one.label: one for one in (*operations, *(one for one, _ in (*named.values(), *known.values())))}
         yield from _map_lines([*every.values()], graph, domain_id)
     finally:
@@ -279,8 +248,8 @@ def _why_not(one: Operation, graph: Graph) -> str:
         return "its path has a parameter: write an operation for each value, as in GET /topics/odom"
     if one.method != "GET" and one.method not in _SENDS:
         return "it reads nothing and sends nothing, unless it cancels a goal"
-    if schema is None or not any(at for at, _ in _leaves(schema)):
-        is_list = schema is not None and _items(schema) is not None
+    if schema is None or not any(at for at, _ in leaves_of(schema)):
+        is_list = schema is not None and items_of(schema) is not None
         return "a list, but not of the graph's names, all or of one type" if is_list else "its schema names no fields"
     ends = f"{len(graph.topics)} topics, {len(graph.services)} services and {len(graph.actions)} actions"
     return f"nothing on the graph has its fields, of {ends}"
@@ -308,8 +277,8 @@ def _topic(one: Operation, graph: Graph, written: Collection[str]) -> _Proposal 
 def _failure(one: Operation, at: str, definition: Definition) -> dict[str, Any]:
     """Return the key `failure` where a successful response has a boolean for it outside of its message."""
     contents = (content for status, content in one.responses.items() if status.startswith("2"))
-    leaves = [pair for content in contents for schema in content.values() for pair in _leaves(schema)]
-    own = dict(_own_leaves(definition))
+    leaves = [pair for content in contents for schema in content.values() for pair in leaves_of(schema)]
+    own = dict(fields_of(definition))
     for names, value in _FAILURES.items():
         for place, leaf in leaves:
             is_inside = place.startswith(f"{at}/") if at else place in own
@@ -335,7 +304,7 @@ def _best(
     if reads and _COMMANDS.search(name):
         return name, "its name is that of a topic for commands."
     alike = any(fits[other].size == fits[name].size for other in others)
-    if name and not _shared_words(one, name) and (alike or fits[name].size < _FEW):
+    if name and not _shared_words(one, name) and (alike or fits[name].size < FEW):
         return name, "the fields agree, but not the name."
     return name, fits[name].guess if name else ""
 
@@ -353,6 +322,34 @@ def _call(one: Operation, graph: Graph) -> _Proposal | None:
     return _Proposal(keys, requests[name].forms | responses[name].forms, guess)
 
 
+def _by_parameters(one: Operation, graph: Graph) -> tuple[Operation, dict[str, Any]] | None:
+    """Return an operation with its parameters written out, and the keys of the service or topic that has their fields.
+
+    None: its parameters are no message, or which one is a guess.
+    """
+    given = {item.name: item for item in (*one.parameter("path"), *one.parameter("query"))}
+    if not given or body_schema(one) is not None:
+        return None
+    schema = {"properties": {name: item.schema for name, item in given.items()}}
+    fits = {name: fit for name, fit in graph.fitting(schema, graph.services, "#Request").items() if fit.size}
+    responses = graph.fitting(one.shape, {name: graph.services[name] for name in fits}, "#Response")
+    name, guess = _best(one, {name: fit for name, fit in responses.items() if not fit.fields})
+    keys: dict[str, Any] = {"service": name, "type": graph.services.get(name)}
+    keys |= {"result": responses[name].at} if name and responses[name].at else {}
+    if not name and one.method in _SENDS:
+        fits = graph.fitting(schema, graph.topics)
+        name, guess = _best(one, {topic: fit for topic, fit in fits.items() if _shared_words(one, topic)})
+        keys = {"publishes": name, "type": graph.topics.get(name)}
+    if not name or guess:
+        return None
+    fields = fits[name].fields or {f"/{field}": f"/{field}" for field in given}
+    own = {web.removeprefix("/"): place for web, place in fields.items()}
+    if any(item.required and item.name not in own for item in given.values()):
+        return None
+    query = "&".join(f"{item.name}={{{item.name}}}" for item in one.parameter("query") if item.name in own)
+    return replace(one, template=f"{one.template}{'?' * bool(query)}{query}"), keys | {"in_url": own}
+
+
 def _goal(one: Operation, operations: Sequence[Operation], graph: Graph, followers: set[str]) -> _Proposal | None:
     """Return the proposal that an operation sends goals to an action, or begins calls that are followed like goals.
 
@@ -361,7 +358,7 @@ def _goal(one: Operation, operations: Sequence[Operation], graph: Graph, followe
     ends, part = (graph.actions, "Goal") if graph.actions or not graph.is_named else (graph.services, "Request")
     fits = graph.fitting(body_schema(one), ends, f"#{part}")
     name, guess = _best(one, fits)
-    id_ = next((at for at, _ in _leaves(one.shape or {}) if re.search(r"[/_]u?u?id$", at)), None)
+    id_ = next((at for at, _ in leaves_of(one.shape or {}) if re.search(r"[/_]u?u?id$", at)), None)
     if not name or id_ is None:
         return None
     is_goal = part == "Goal"
@@ -377,7 +374,7 @@ def _goal(one: Operation, operations: Sequence[Operation], graph: Graph, followe
             if cancels and other.method != "GET":
                 keys |= {"cancel": call} if is_goal else {}
             elif other.method == "GET" and other.shape is not None and "state" not in keys:
-                leaves = ((at, leaf) for at, leaf in _leaves(other.shape) if _STATE.search(at))
+                leaves = ((at, leaf) for at, leaf in leaves_of(other.shape) if _STATE.search(at))
                 found = {at: _states(leaf) for at, leaf in leaves}
                 # A call cannot be canceled: words for that are of goals beside it.
                 at = max(found, key=lambda at: (is_goal or "canceled" not in found[at], len(found[at])), default="")
@@ -407,9 +404,9 @@ def _states(leaf: Schema) -> dict[str, list[str]]:
 
 def _lists(one: Operation, graph: Graph) -> _Proposal | None:
     """Return the proposal that an operation lists the graph, if its response has all names of a kind, or of a type."""
-    for at, leaf in _leaves(one.shape or {}):
-        items = _items(leaf)
-        members = dict(_leaves(items)) if items else {}
+    for at, leaf in leaves_of(one.shape or {}):
+        items = items_of(leaf)
+        members = dict(leaves_of(items)) if items else {}
         listed = value_at(graph.read.get(one.label), at)
         for kind, ends in (("topics", graph.topics), ("services", graph.services), ("actions", graph.actions)):
             for name in members if ends and isinstance(listed, list) else ():
@@ -439,149 +436,3 @@ def _shared_words(one: Operation, name: str) -> float:
 
 def _is_word(short: str, long: str) -> bool:
     return short == long or (len(short) > 2 and long.startswith(short))  # noqa: PLR2004 - shorter ones begin anything
-
-
-def _places(schema: Schema) -> dict[str, dict[str, Schema]]:
-    """Return each object in a schema by its position: the fields below it, by their positions in it."""
-    leaves = dict(_leaves(schema))
-    steps = [at.split("/")[:-1] for at in leaves]
-    places = sorted({"/".join(step[:end]) for step in steps for end in range(1, len(step) + 1)})
-    return {
-        place: {at.removeprefix(place): leaf for at, leaf in leaves.items() if at.startswith(f"{place}/")}
-        for place in places[:_PLACES]
-    }
-
-
-def _fit(places: dict[str, dict[str, Schema]], definition: Definition, message: str = "") -> Fit | None:
-    """Return how a schema has the fields of a message, where in it it has most; None if it is another message.
-
-    Args:
-        places: places of the schema.
-        definition: the definition of a type.
-        message: a type in it; empty means itself.
-    """
-    own = dict(_own_leaves(definition, message))
-    if not own:
-        return Fit("", {}, 0, 0, {})
-    by_key: dict[str, set[str]] = {}
-    for pointer in own:
-        steps = pointer.split("/")[1:]
-        for first in range(len(steps)):
-            by_key.setdefault(_key("".join(steps[first:])), set()).add(pointer)
-    best, best_rank = cast("Fit | None", None), (0, 0)
-    for place, below in places.items():
-        pairs, forms = _pairs(below, by_key), dict[str, str]()
-        lacks = len(own) - len(pairs)
-        # A part of a message counts only if the body has all of that part, and it is at least half of the message.
-        fits = not lacks or (len(pairs) == len(below) and 2 * len(pairs) >= len(places[""]))
-        # With as many fields, and fewer others beside them, it is more likely the message.
-        rank = (len(pairs), -len(below))
-        if (
-            fits
-            and pairs
-            and rank > best_rank
-            and all(_has_type(below[web], own[one], definition, forms) for web, one in pairs.items())
-        ):
-            keys = [(_key(web), _key(one)) for web, one in pairs.items()]
-            short = any(web != one and (not one.endswith(web) or _AXIS.fullmatch(web)) for web, one in keys)
-            best_rank = rank
-            best = Fit(
-                place, _fields(pairs, own), len(pairs), lacks, forms, "some of its fields have short names." * short
-            )
-    return best
-
-
-def _pairs(leaves: Collection[str], by_key: dict[str, set[str]]) -> dict[str, str]:
-    """Return the position in a message of each field of a schema that has one.
-
-    A field is known by its path however its words are written, or by the end of a path that no other field has; such
-    as qw and frame by what they stand for; and the last one of many, as it is left.
-
-    Args:
-        leaves: the schema's fields.
-        by_key: those of the message, by their paths and all ends of these.
-    """
-    found: dict[str, str] = {}
-    for web in leaves:
-        key, axis = _key(web), _AXIS.fullmatch(_key(web))
-        for name in (key, f"{_LETTERS[axis[1]]}{axis[2]}" if axis else f"{key}id"):
-            named = by_key.get(name, set())
-            exact = {pointer for pointer in named if _key(pointer) == name} or named
-            if web not in found and len(exact) == 1 and not exact <= {*found.values()}:
-                found[web] = next(iter(exact))
-    left = {pointer for pointers in by_key.values() for pointer in pointers}.difference(found.values())
-    for web in {*leaves}.difference(found) if len(left) == 1 and len(leaves) == len(found) + 1 > _FEW else ():
-        found[web] = left.pop()
-    return found
-
-
-def _key(text: str) -> str:
-    return re.sub("[^a-z0-9]", "", text.lower())
-
-
-def _fields(pairs: dict[str, str], own: Collection[str]) -> dict[str, str]:
-    """Return the key `fields` of the map for pairs of fields: equal ones below two positions follow from these."""
-    if len(pairs) == len(own) and all(web == one for web, one in pairs.items()):
-        return {}
-    found: dict[str, str] = {}
-    for web, one in pairs.items():
-        here, there = web, one
-        while here.rpartition("/")[2] == there.rpartition("/")[2]:
-            above, over = here.rpartition("/")[0], there.rpartition("/")[0]
-            below = [other.removeprefix(over) for other in own if other.startswith(f"{over}/")]
-            if not above or not over or any(pairs.get(above + rest) != over + rest for rest in below):
-                break
-            here, there = above, over
-        found[here] = there
-    return found
-
-
-def _own_leaves(definition: Definition, message: str = "", at: str = "") -> Iterator[tuple[str, Shape]]:
-    """Yield the fields of a message that are no messages themselves, by position."""
-    for name, shape in definition.fields(message):
-        if shape.is_message and not shape.is_array:
-            yield from _own_leaves(definition, shape.item, f"{at}/{name}")
-        else:
-            yield f"{at}/{name}", shape
-
-
-def _leaves(schema: Schema) -> Iterator[tuple[str, Schema]]:
-    """Yield the fields of a schema that are no objects, by position; itself if it is none."""
-    left: list[tuple[str, Schema]] = [("", schema)]
-    for _ in range(_LEAVES):
-        if not left:
-            return
-        at, one = left.pop(0)
-        members = {name: member for part in parts_of(one) for name, member in part.get("properties", {}).items()}
-        if members and at.count("/") < _DEPTH:
-            places = {f"{at}/{name.replace('~', '~0').replace('/', '~1')}": member for name, member in members.items()}
-            left[:0] = [(place, member) for place, member in places.items() if isinstance(member, dict)]
-        else:
-            yield at, one
-
-
-def _items(schema: Schema) -> Schema | None:
-    return next((part["items"] for part in parts_of(schema) if isinstance(part.get("items"), dict)), None)
-
-
-def _has_type(leaf: Schema, shape: Shape, definition: Definition, forms: dict[str, str]) -> bool:
-    """Return whether a schema is that of a field; note how it writes numbers and octets."""
-    kinds, items, parts = kinds_of(leaf), _items(leaf), list(parts_of(leaf))
-    if shape.is_octets:
-        forms["bytes"] = "array" if "array" in kinds else "base64"
-        return not kinds.isdisjoint({"string", "array"})
-    if shape.is_array:
-        if items is None or not shape.is_message:
-            return items is not None and _has_type(items, Shape(shape.item), definition, forms)
-        found = _fit(_places(items), definition, shape.item)
-        forms |= found.forms if found else {}
-        return found is not None and not (found.at or found.fields or found.lacks)
-    if shape.item in LONG:
-        forms["integers"] = "string" if "string" in kinds else "number"
-    if shape.item in FLOATS and any("NaN" in part.get("enum", ()) for part in parts):
-        forms["non_finite"] = "string"
-    elif shape.item in FLOATS and any("null" in (part.get("type"), *part.get("type", ())) for part in parts):
-        forms["non_finite"] = "null"
-    wanted = {"integer", "number"} if shape.item in INTEGERS else {"number"} if shape.item in FLOATS else {shape.item}
-    wanted |= {"string"} if shape.is_text or shape.item in LONG else set()
-    return not kinds.isdisjoint(wanted)

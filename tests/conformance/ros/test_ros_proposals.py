@@ -207,13 +207,16 @@ TOLD = {
     "/data": ("get", {"parameters": [{"name": "topic", "in": "query", "required": True, "schema": WORD}]}),
     "/publish": ("post", {"topic": WORD, "type": WORD, "msg": OBJECT}),
     "/services/call": ("post", {"name": WORD, "args": OBJECT}),
-}
+    "/turn": (
+        "post", {"parameters": [{"name": "data", "in": "query", "required": True, "schema": {"type": "number"}}]},
+    ),
+}  # fmt: skip
 SAID = {"topic": "/robot1/say", "type": "std_msgs/msg/String"}
 TURN = {"topic": "/robot1/turn", "type": "std_msgs/msg/Float64"}
 
 
 class _Told:
-    """A gateway that is told the ROS name by a query or a body."""
+    """A gateway that is told the ROS name by a query or a body, or a message by a query."""
 
     def __init__(self, domain_id):
         self.ros, self.last, self.lock = RosProcess("gateway", domain_id=domain_id), {}, threading.Lock()
@@ -223,7 +226,16 @@ class _Told:
         if path == "/openapi.json":
             return 200, {"openapi": "3.1.0", "info": {"title": "x", "version": "1"}, "paths": self.paths()}
         with self.lock:
+            if path.startswith("/turn"):
+                return self.turn(path.partition("?data=")[2])
             return self.read(path.partition("?topic=")[2]) if method == "GET" else self.write(content)
+
+    def turn(self, text):
+        try:
+            self.ros.tell("publish", **TURN, values=[{"data": float(text)}])
+        except ValueError:
+            return 422, {}
+        return 200, {}
 
     @staticmethod
     def paths():
@@ -231,7 +243,7 @@ class _Told:
         for path, (method, said) in TOLD.items():
             body = {"content": {"application/json": {"schema": {"type": "object", "properties": said}}}}
             found[path] = {method: {"responses": {"200": {"description": "done"}}}}
-            found[path][method] |= said if method == "get" else {"requestBody": body | {"required": True}}
+            found[path][method] |= said if "parameters" in said else {"requestBody": body | {"required": True}}
         return found
 
     def read(self, topic):
@@ -268,6 +280,7 @@ def test_a_name_in_a_query_or_a_body_is_written_out_and_a_run_with_the_map_passe
         tables = found["ros"]["operations"]
         assert tables == {
             "GET /data?topic=/robot1/state": {"topic": "/robot1/state", "type": SAID["type"], "at": "/message"},
+            "POST /turn?data={data}": {"publishes": TURN["topic"], "type": TURN["type"], "in_url": {"data": "/data"}},
             **{
                 f"POST /publish#{one['topic']}": {"publishes": one["topic"], "type": one["type"], "at": "/msg"}
                 | {"body": one}
