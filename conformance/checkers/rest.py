@@ -24,7 +24,7 @@ from conformance.checkers.siblings import Siblings
 from conformance.checkers.texts import Texts
 from conformance.checkers.totals import Sublists
 from conformance.checkers.transitions import Transitions
-from conformance.checkers.untouched import Parts, Untouched
+from conformance.checkers.untouched import Elsewhere, Parts, Untouched
 from conformance.checkers.writes import Writes
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import resource_at
@@ -52,7 +52,7 @@ class Histories:
         # Checkers that remember values which a request of unknown effect may change.
         self._states = (
             Writes(contract), Changes(contract), Untouched(contract), Answers(contract), Commands(contract),
-            Parts(contract), Siblings(contract),
+            Parts(contract), Siblings(contract), Elsewhere(contract),
         )  # fmt: skip
         self._checkers = (
             Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory, *self._states,

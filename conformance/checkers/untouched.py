@@ -12,13 +12,14 @@ from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Any, Final, NamedTuple
 
+from conformance.api.rest.listing import listing_of
 from conformance.api.rest.patches import same
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import parts_of
+from conformance.api.rest.things import is_shared, parts_of
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_text import clip, read_json
-from conformance.documents.openapi import SAFE, is_json, operations_of
+from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.verdict.evidence import Case
@@ -186,6 +187,94 @@ class Parts:
                     expected, found = f"{clip(part)} as {one}, as its own resource shows it", clip(inner)
                     id_, doubt = "description/written-is-read", "one of them may be what is in effect"
                     yield occasion.case(id_, same(inner, part), expected, found, cause=f"{one} part", doubt=doubt)
+
+
+# Phrases with which a description says that a request changes nothing but what it names.
+_NAMED: Final = re.compile(
+    r"\bno (?:operation|request|call|write)\b[^.]*\bchanges?\b[^.]*\b(?:but|except|other than) (?:\w+ ){1,3}names?\b",
+    re.IGNORECASE,
+)
+
+
+def says_named(contract: Contract) -> bool:
+    """Return whether the description says that no request changes anything but what it names."""
+    info = contract.openapi.get("info", {}) if contract.openapi_path else {}
+    return bool(_NAMED.search(str(info.get("description", ""))))
+
+
+class Elsewhere:
+    """Judges whether a write to a part of a thing gives its value to another thing.
+
+    If the description says that no request changes what it does not name, members that clients set of any other
+    resource are judged.
+    """
+
+    def __init__(self, contract: Contract) -> None:
+        operations = operations_of(contract) if contract.openapi_path else ()
+        self._is_said = says_named(contract)
+        self._reads = {one.label for one in operations if one.method == "GET" and one.shape}
+        # Members that a PUT or PATCH of a resource writes, by its path template.
+        self._written: dict[str, set[str]] = defaultdict(set)
+        for one in operations:
+            for body in one.bodies.values() if one.method in {"PUT", "PATCH"} else ():
+                self._written[one.template.rstrip("/")] |= parts_of(body.schema).keys()
+        # Members at the last read and the writes since, by path.
+        self._seen: dict[str, tuple[dict[str, Any], list[Occasion]]] = {}
+        self._moving: set[tuple[str, str]] = set()
+        self._changed: Counter[tuple[str, str, str]] = Counter()
+
+    def forget(self) -> None:
+        """Forget all reads: something else may have changed the resources."""
+        self._seen.clear()
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        operation, path = occasion.operation, occasion.context.target.partition("?")[0].rstrip("/")
+        if occasion.request.method not in SAFE:
+            for _, since in self._seen.values() if not refuses(occasion.response.status, operation) else ():
+                since.append(occasion)
+            return
+        is_plain = occasion.request.method == "GET" and occasion.response.ok and occasion.context.plain
+        if is_plain and operation is not None and operation.label in self._reads:
+            yield from self._read(occasion, operation, path)
+
+    def _read(self, occasion: Occasion, read: Operation, path: str) -> Iterator[Case]:
+        now, (before, since) = occasion.members(parts_of(read.shape)), self._seen.pop(path, ({}, []))
+        if len(self._seen) < _MOST:
+            self._seen[path] = now, []
+        changed = {name for name in before if name in now and not same(before[name], now[name])}
+        if not since:
+            self._moving |= {(read.template, name) for name in changed}
+        write = since[0] if len(since) == 1 else None
+        if write is None or write.operation is None or not before:
+            return
+        label, may = write.operation.label, self._free_members(write, read, path, now)
+        wrong = [name for name in sorted(changed & may) if (read.template, name) not in self._moving]
+        for name in wrong:
+            self._changed[label, read.template, name] += 1
+        often = [name for name in wrong if self._changed[label, read.template, name] >= _TWICE]
+        if may and (often or not wrong):
+            name = next(iter(often), "")
+            expected = f"the members as before {label}, which does not name them"
+            found = f"{clip(now[name])} as {name}, and {clip(before[name])} before" if name else ""
+            cause = f"{label} {read.template} {name} elsewhere"
+            yield occasion.case("description/written-is-read", not name, expected, found, cause=cause)
+
+    def _free_members(self, write: Occasion, read: Operation, path: str, now: dict[str, Any]) -> set[str]:
+        """Return the members of a resource that a write names in no way: of another thing, those with a sent value."""
+        there, template = write.context.target.partition("?")[0].rstrip("/"), read.template.rstrip("/")
+        at = write.operation.template.rstrip("/") if write.operation is not None else ""
+        if f"{path}/".startswith(f"{there}/") or f"{there}/".startswith(f"{path}/"):
+            return set()
+        value = read_json(write.request.body).value
+        sent = value if isinstance(value, dict) else {}
+        parts = parts_of(read.shape)
+        if "{" in template and at.startswith(f"{template}/") and listing_of(read) is None:
+            taken = (name for name, one in now.items() if any(same(one, other) for other in sent.values()))
+            return {name for name in taken if not (isinstance(now[name], bool | None) or is_shared(name))}
+        own = {plain_name(name) for name in sent}
+        names = self._written[template] if self._is_said else set()
+        return {name for name in names if not flat(parts.get(name, {})).get("readOnly") and plain_name(name) not in own}
 
 
 def _is_list_of_things(value: Any) -> bool:

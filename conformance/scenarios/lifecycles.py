@@ -28,6 +28,7 @@ from conformance.api.rest.things import (
 )
 from conformance.api.rest.values import Values
 from conformance.checkers.transitions import ONCE, barred_by
+from conformance.checkers.untouched import says_named
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
@@ -37,7 +38,7 @@ from conformance.scenarios.chosen import Chosen
 from conformance.scenarios.living import ABSENT, Kind, Life, Living, State, Thing
 from conformance.scenarios.refusing import is_refused, look_refused, refuse_changes, refuse_creation, refuse_deletion
 from conformance.scenarios.scenario import NotPossibleError, NotSeenError, scenario
-from conformance.scenarios.singletons import singletons
+from conformance.scenarios.singletons import is_free, singletons
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.writing import Write, Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError
@@ -51,6 +52,7 @@ _SLOW_BUDGETS = 3  # the same with a slow device
 _ACTIONS: Final = 3
 # How long a thing is left alone at most, s.
 _ALONE_S: Final = 6.0
+_BESIDE = 4  # writes around which things beside are read, and most times of each
 _CLIENTS = 2  # clients that create things at the same time
 _AT_ONCE = 110  # number from which the values of their first things are made
 # Numbers from which values are made, so that they differ: for changes, refused requests, and an identifier that is
@@ -73,12 +75,45 @@ def lifecycles(api: RestInterface, values: Values) -> tuple[Life, ...]:
             # Created things are deleted even after the time limit.
             with api.run.limit.lift():
                 lives += _seen_twice(partial(_Cycle, Writer(api, values), create, read, operations, held))
+    _look_beside(Writer(api, values), operations)
     lives += singletons(Writer(api, values), operations)
     if held and not lives:
         raise NotSeenError(held_text(held, set(held.values())))
     if not lives:
         raise NotPossibleError("no POST or PUT that may be called creates a thing that a GET reads")
     return tuple(lives)
+
+
+def _look_beside(writer: Writer, operations: dict[tuple[str, str], Operation]) -> None:
+    """Write to what no GET has, with reads of other things around each request; a checker judges these.
+
+    These are things like the one of which a part is written. If the description says that no request changes what it
+    does not name, resources that clients set are read too, each after it was set.
+    """
+    single = {
+        path: one for (method, path), one in operations.items() if method == "PUT" and ("GET", path) in operations
+    }
+    is_said = says_named(writer.api.run.contract)
+    single = {path: one for path, one in single.items() if is_said and not one.parameter("path") and is_free(one, path)}
+    writes = [one for (method, path), one in operations.items() if method in {"PUT", "PATCH"} and one.bodies]
+    writes = [one for one in writes if ("GET", one.template) not in operations and is_free(one, one.template)]
+    for write in writes[:_BESIDE]:
+        item, targets = (
+            operations.get(("GET", write.template.rpartition("/")[0])),
+            [(operations["GET", one], one) for one in single],
+        )
+        if item is not None and len(item.parameter("path")) == 1:
+            name, ids = item.parameter("path")[0].name, writer.values.of(item, item.parameter("path")[0])
+            targets += [(item, item.template.replace(f"{{{name}}}", quote(str(one), safe=""))) for one in ids]
+        for turn in range(_BESIDE if single else 2 if targets else 0):
+            with suppress(NoAnswerError):  # the survey reports a broken connection
+                for path, change in single.items():
+                    writer.conditional(change, operations["GET", path], path)
+                for read, path in targets:
+                    writer.send(read, path)
+                writer.send(write, "", next(iter(writer.bodies(write, turn)[:: (-1, 1)[turn % 2]]), None))
+                for read, path in targets:
+                    writer.send(read, path)
 
 
 def _seen_twice(cycle: Callable[[int], _Cycle]) -> list[Life]:

@@ -141,3 +141,56 @@ def test_a_path_that_leads_to_the_last_thing_is_not_judged_by_it(contracts):
     writes = [step for text in ("text one", "text two") for step in (("PATCH", "2", text), ("GET", "latest", text))]
     steps = [("GET", "latest", "a text"), *writes]
     assert _of_another(contracts[False], ((*step, "2") for step in steps)) == set()
+
+
+_LAMP = {"type": "object", "properties": {"id": {}, "glow": {"type": "integer"}, "heat": {"type": "integer"}}}
+_MODE = {"type": "object", "properties": {"mode": {"type": "string"}, "at": {"type": "string", "readOnly": True}}}
+_TAKES = {"level": {"type": "integer"}}
+
+
+def _bodied(schema):
+    return {"requestBody": {"content": {"application/json": {"schema": schema}}}, "responses": {"200": answers(schema)}}
+
+
+def _lit(contract, *steps):
+    """Return what breaks of reads of lamps and of a mode around writes of levels; steps: method, path, and a body."""
+    exchanges = [
+        exchange(method, f"{_BASE}/{path}", shown=body, sent=body if method == "PUT" else None, at_s=10.0 * number)
+        for number, (method, path, body) in enumerate(steps)
+    ]
+    return {case.requirement for case in failed(contract, _BASE, exchanges) if "elsewhere" in case.cause}
+
+
+def _around(path, changes, writes=("lamps/1/level", "lamps/1/level")):
+    """Return reads of a resource before and after writes of the levels 10, 20 and so on."""
+    steps = [("GET", path, changes[0])]
+    for number, (change, at) in enumerate(zip(changes[1:], writes, strict=True), 1):
+        steps += [("PUT", at, {"level": 10 * number}), ("GET", path, change)]
+    return steps
+
+
+@pytest.mark.parametrize("says", ["No operation changes anything but what it names.", ""])
+@pytest.mark.parametrize(
+    ("path", "changes", "blamed"),
+    [
+        ("lamps/2", [{"glow": 1}, {"glow": 10}, {"glow": 20}], "always"),
+        ("lamps/1", [{"glow": 1}, {"glow": 10}, {"glow": 20}], ""),
+        ("lamps/2", [{"glow": 1}, {"glow": 10}, {"glow": 10}], ""),
+        ("lamps/2", [{"heat": 1}, {"heat": 2}, {"heat": 3}], ""),
+        ("mode", [{"mode": "a"}, {"mode": "b"}, {"mode": "a"}], "said"),
+        ("mode", [{"at": "a"}, {"at": "b"}, {"at": "c"}], ""),
+    ],
+    ids=["another lamp takes it", "this lamp", "another lamp once", "a lamp gets warm", "the mode", "a time"],
+)
+def test_what_a_write_does_not_name_stays(says, path, changes, blamed, tmp_path):
+    document = described(
+        {
+            "/lamps/{id}": {"parameters": [_ID], "get": {"responses": {"200": answers(_LAMP)}}},
+            "/lamps/{id}/level": {"parameters": [_ID], "put": _bodied({"type": "object", "properties": _TAKES})},
+            "/mode": {"get": {"responses": {"200": answers(_MODE)}}, "put": _bodied(_MODE)},
+        },
+        "3.1.0",
+    )
+    document["info"]["description"] = says
+    is_blamed = blamed == "always" or (blamed == "said" and bool(says))
+    assert _lit(contract_of(tmp_path, document), *_around(path, changes)) == ({_READ} if is_blamed else set())
