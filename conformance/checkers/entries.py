@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from http import HTTPStatus
+from itertools import combinations
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 from urllib.parse import unquote
@@ -30,7 +32,7 @@ from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
-from conformance.verdict.evidence import Case
+from conformance.verdict.evidence import SENTENCE, Case
 
 # Entries of one list that are remembered.
 _MOST: Final = 200
@@ -308,10 +310,24 @@ def _begins(value: Any, seen: Any) -> bool:
     )
 
 
+# Phrases in a description for the order in which things were created: of all items, and of those that sort alike.
+_CREATED: Final = re.compile(r"\bin (?:the )?order of (?:their |its )?creation\b|\bin creation order\b", re.IGNORECASE)
+_ALIKE: Final = re.compile(rf"\b(?:equal|ties?|tied|same|alike)\b[^.;]*(?:{_CREATED.pattern})", re.IGNORECASE)
+
+
+class _Made(NamedTuple):
+    """A creation: how many there were before it, and when it was sent and answered, s of the monotonic clock."""
+
+    number: int
+    sent_s: float
+    at_s: float
+
+
 class Listed:
     """Judges whether a whole list has each created thing that a read before and one after it find.
 
-    A list may leave out things in some states, and old ones: so it has an older thing in the same states.
+    A list may leave out things in some states, and old ones: so it has an older thing in the same states. If the
+    description promises the order of creation, each page is judged by it.
     """
 
     def __init__(self, contract: Contract) -> None:
@@ -320,7 +336,7 @@ class Listed:
         # The read of its things, by path template of a list.
         self._reads = {collection_of(one.template): one for one in reads if listing_of(one) is None}
         # How many things were created before it, and when, by path; then the states of what reads found since a change.
-        self._made: dict[str, tuple[int, float]] = {}
+        self._made: dict[str, _Made] = {}
         self._there: dict[str, list[Any]] = {}
         # Lists without a thing, and the fault, by the path of that.
         self._missed: dict[str, Case] = {}
@@ -336,7 +352,7 @@ class Listed:
                 self._there, self._missed = {}, {}
             read = self._reads.get(template) if answer.status == HTTPStatus.CREATED and method == "POST" else None
             if read is not None and (id_ := identifier_of(read_json(answer.body).value, read)):
-                made = len(self._made) + 1, answer.received_s
+                made = _Made(len(self._made) + 1, occasion.sent_s, answer.received_s)
                 self._made |= {f"{path}/{id_}".casefold(): made} if len(self._made) < _MOST else {}
         elif operation is not None and method == "GET" and answer.ok:
             above = self._reads.get(collection_of(template))
@@ -352,6 +368,8 @@ class Listed:
         """Judge a whole list, and keep what it lacks until a read finds that."""
         listing, read = listing_of(operation), self._reads[operation.template.rstrip("/")]
         sent = listing.query_texts(occasion.context.target) if listing is not None else None
+        if listing is not None and sent is not None:
+            yield from self._order(occasion, listing, page, sent, path)
         paging = (
             {one.name for one in (listing.limit, listing.sort) if one is not None} if listing is not None else set()
         )
@@ -360,18 +378,43 @@ class Listed:
         items = {
             f"{path}/{identifier_of(item, read)}".casefold(): item for item in page.items if isinstance(item, dict)
         }
-        known = [(self._made.get(key, (0, 0.0))[0], _states_of(item, read)) for key, item in items.items()]
+        known = [
+            (self._made[key].number if key in self._made else 0, _states_of(item, read)) for key, item in items.items()
+        ]
         there = {key: one for key, one in self._there.items() if key.rpartition("/")[0] == path}
-        there = {key: one for key, one in there.items() if occasion.sent_s - self._made[key][1] > _SETTLES_S}
+        there = {key: one for key, one in there.items() if occasion.sent_s - self._made[key].at_s > _SETTLES_S}
         for key, states in there.items():
             expected, cause = f"a list with {key}, which reads find", f"{operation.label} lacks"
             if key in items:
                 yield occasion.case("description/created-is-there", True, expected, cause=cause)  # noqa: FBT003
-            elif any(number < self._made[key][0] and states == one for number, one in known):
+            elif any(number < self._made[key].number and states == one for number, one in known):
                 doubt = "" if page.totals else "the list may leave some things out"
                 found = f"{len(items)} items without it"
                 id_ = "description/created-is-there"
                 self._missed[key] = occasion.case(id_, False, expected, found, cause=cause, doubt=doubt)  # noqa: FBT003
+
+    def _order(
+        self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str], path: str
+    ) -> Iterator[Case]:
+        """Judge the order of creation, of all items or of those with the same value of the member that sorts."""
+        sort, read = listing.sort, self._reads[listing.operation.template.rstrip("/")]
+        by = listing.sortings.get(sent.get(sort.name, "")) if sort is not None else None
+        is_said = _CREATED.search(listing.operation.text) if sort is None else by and _ALIKE.search(sort.says)
+        if not is_said or listing.direction is not None:
+            return
+        items = [(f"{path}/{identifier_of(item, read)}".casefold(), members_of(item)) for item in page.items]
+        known = [(self._made[key], item.get(by.member) if by else None) for key, item in items if key in self._made]
+        pairs = [(one[0], other[0]) for one, other in combinations(known, 2) if one[1] == other[1]]
+        wrong = [(one, other) for one, other in pairs if other.at_s < one.sent_s]
+        if pairs:
+            of = f"those with the same {by.member}" if by else "items"
+            found = f"creation {wrong[0][0].number} before creation {wrong[0][1].number}" if wrong else ""
+            expected, cause = (
+                f"{of} in the order of creation, by the description",
+                f"{listing.operation.label} creation",
+            )
+            id_ = "description/list-order"
+            yield occasion.case(id_, not wrong, expected, found, cause=cause, doubt=SENTENCE)
 
 
 def _states_of(thing: dict[str, Any], read: Operation) -> list[Any]:

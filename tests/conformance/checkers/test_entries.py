@@ -45,6 +45,32 @@ _PATHS |= {
         "get": {"responses": {"200": answers(_JOB)}},
     },
 }
+_RANKS = {"type": "array", "items": {"type": "object", "properties": {"id": {}, "rank": {"type": "integer"}}}}
+_SORT = {
+    "name": "sort",
+    "in": "query",
+    "schema": {"enum": ["rank", "-rank"]},
+    "description": "Equal ones in the order of their creation.",
+}
+_RANKED = {
+    f"/{name}/{{id}}": {
+        "parameters": _PATHS["/jobs/{id}"]["parameters"],
+        "get": {"responses": {"200": answers(_RANKS["items"])}},
+    }
+    for name in ("aged", "ranked")
+}
+_RANKED |= {
+    f"/{name}": {
+        "get": {
+            "summary": "In the order of their creation." * (not more),
+            "parameters": more,
+            "responses": {"200": answers(_RANKS)},
+        },
+        "post": {"responses": {"201": answers(_RANKS["items"])}},
+    }
+    for name, more in (("aged", []), ("ranked", [_SORT]))
+}
+_PATHS |= _RANKED
 _THERE, _READ, _KEPT, _GONE = (
     f"description/{name}" for name in ("created-is-there", "written-is-read", "refused-keeps", "deleted-is-gone")
 )
@@ -181,3 +207,25 @@ def test_a_whole_list_has_what_reads_find(contract, listed, blamed):
 
 def test_a_list_may_leave_out_the_oldest(contract):
     assert _broken(contract, _read_around([(3,)], 1, 2)) == {}
+
+
+@pytest.mark.parametrize(
+    ("target", "order", "blamed"),
+    [
+        ("/aged", [1, 2, 3], False),
+        ("/aged", [3, 2, 1], True),
+        ("/ranked", [3, 2, 1], False),
+        ("/ranked?sort=rank", [3, 2, 1], True),
+        ("/ranked?sort=rank", [2, 3, 1], False),
+        ("/ranked?sort=-rank", [1, 2, 3], False),
+    ],
+)
+def test_an_order_of_creation_that_is_promised(contract, target, order, blamed):
+    path = target.partition("?")[0]
+    things = {number: {"id": f"t{number}", "rank": number // 2} for number in (1, 2, 3)}
+    made = [exchange("POST", _BASE + path, 201, things[number], at_s=float(number)) for number in things]
+    shown = [things[number] for number in order]
+    found = failed(contract, _BASE, [*made, exchange("GET", _BASE + target, 200, shown, at_s=9.0)])
+    assert {case.requirement for case in found if case.cause.endswith(" creation")} == (
+        {"description/list-order"} if blamed else set()
+    )
