@@ -82,8 +82,10 @@ def note_signals(run: Run) -> Iterator[Interruption]:
             signal.signal(number, handler)
 
 
-# A line at least this often, s.
-_OFTEN_S = 2.0
+# A line at least so often, s: where a check ends, and within one.
+_OFTEN_S, _WITHIN_S = 2.0, 10.0
+# The bar is renewed so often within a check, s.
+_RENEWED_S = 1.0
 _BAR = 24  # columns of the bar
 _BEFORE_TEXT = 42  # columns of the bar with brackets, counts and blanks
 # Words for a requirement that is not met, by level; what a robot MAY do is no failure.
@@ -111,6 +113,8 @@ class Progress:
         self._failures = 0
         self._done = self._total = 0
         self._bar: ProgressBar[Any] | None = None
+        self._text, self._began = "", self._started
+        self._ends, self._writing = threading.Event(), threading.Lock()
 
     def pytest_collection_finish(self, session: pytest.Session) -> None:
         """Store the number of checks."""
@@ -119,6 +123,19 @@ class Progress:
             self._bar = click.progressbar(
                 length=self._total, file=self._out, show_eta=False, show_pos=True, width=_BAR, item_show_func=_fit
             )
+        if self._out is not None:
+            threading.Thread(target=self._renew, daemon=True).start()
+
+    def _renew(self) -> None:
+        """Show within a check that the run goes on, with the findings that were counted before it."""
+        while not self._ends.wait(_RENEWED_S):
+            with self._writing:
+                now = time.monotonic()
+                if self._bar is not None and self._text and now - self._began > _OFTEN_S:
+                    self._draw(f"{self._requests()}{self._found} | {self._text}, {now - self._began:.0f} s")
+                elif self._bar is None and self._text and now - self._told > _WITHIN_S:
+                    self._told = now
+                    self._write(self._text, f"{self._requests()}{self._found}")
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
@@ -127,23 +144,28 @@ class Progress:
         phase = mark.args[0] if mark else STAGES[0]
         text = f"{item.name.partition('[')[0].removeprefix('test_').replace('_', ' ')} (stage: {phase})"
         now = time.monotonic()
-        if self._bar is not None:
-            self._bar.update(0, f"{self._so_far()} | {text}")
-        elif phase != self._phase or now - self._told > _OFTEN_S:
-            self._phase, self._told = phase, now
-            self._write(text)
+        with self._writing:
+            self._text, self._began = text, now
+            if self._bar is not None:
+                self._draw(f"{self._so_far()} | {text}")
+            elif phase != self._phase or now - self._told > _OFTEN_S:
+                self._phase, self._told = phase, now
+                self._write(text, self._so_far())
         result = yield
-        self._done += 1
-        if self._bar is not None:
-            self._bar.update(1)
+        with self._writing:
+            self._done += 1
+            if self._bar is not None:
+                self._bar.update(1)
         return result
 
     def end(self) -> None:
         """Write the last line, or leave the bar's, also after an interruption."""
+        with self._writing:
+            self._ends.set()
         if self._bar is None:
-            self._write("done")
+            self._write("done", self._so_far())
         else:
-            self._bar.update(0, f"{self._so_far()} | done")
+            self._draw(f"{self._so_far()} | done")
             self._bar.render_finish()
 
     def _so_far(self) -> str:
@@ -168,14 +190,22 @@ class Progress:
                 if run.contract.ledger[id_].class_ not in run.beside
             )
             self._found = "".join(f", {levels[level]} {word}" for level, word in _WORDS.items() if levels[level])
-        return f"{count_of(self._robot.connection.sent, 'request')}{self._found}"
+        return f"{self._requests()}{self._found}"
 
-    def _write(self, text: str) -> None:
+    def _draw(self, text: str) -> None:
+        """Draw the bar with a text; its own ``update`` draws after whole steps alone."""
+        if self._bar is not None:
+            self._bar.current_item = text
+            self._bar.render_progress()
+
+    def _requests(self) -> str:
+        return count_of(self._robot.connection.sent, "request")
+
+    def _write(self, text: str, so_far: str) -> None:
         if self._out is None:
             return
         self._out.write(
-            f"[{time.monotonic() - self._started:5.1f} s] {self._done:3d}/{self._total} checks, "
-            f"{self._so_far()} | {text}\n"
+            f"[{time.monotonic() - self._started:5.1f} s] {self._done:3d}/{self._total} checks, {so_far} | {text}\n"
         )
         self._out.flush()
 

@@ -1,6 +1,7 @@
 """The progress of a run: a bar on a terminal, lines elsewhere, nothing where nobody wants it."""
 
 import io
+import threading
 from types import SimpleNamespace
 
 import pytest
@@ -65,6 +66,33 @@ def test_lines_tell_how_many_checks_are_done(out, bar):
     assert "0/2 checks, 7 requests" in first
     assert "first one" in first
     assert last.endswith("2/2 checks, 7 requests | done")
+
+
+class Waiting(io.StringIO):
+    """A stream that says when a second line, or a bar with seconds, was written."""
+
+    def __init__(self, *, is_terminal):
+        super().__init__()
+        self.isatty, self.renewed = (lambda: is_terminal), threading.Event()
+
+    def write(self, text):
+        if ("first one" in text and "first one" in self.getvalue()) or "), 0 s" in text:
+            self.renewed.set()
+        return super().write(text)
+
+
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_a_check_that_takes_long_is_seen_to_go_on(monkeypatch, is_terminal):
+    for name in ("_OFTEN_S", "_WITHIN_S", "_RENEWED_S"):
+        monkeypatch.setattr(f"conformance.engine.progress.{name}", 0.01)
+    monkeypatch.setenv("COLUMNS", "120")
+    out = Waiting(is_terminal=is_terminal)
+    progress = Progress(robot(), out, bar=True)
+    progress.pytest_collection_finish(SimpleNamespace(items=[check("first_one")]))
+    hook = progress.pytest_runtest_protocol(check("first_one"))
+    next(hook)
+    assert out.renewed.wait(30), out.getvalue()
+    progress.end()
 
 
 def test_without_a_stream_nothing_is_written():
