@@ -14,7 +14,7 @@ from typing import Final
 from conformance.api.rest.inputs import usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
-from conformance.contract.described import MOTION, ROS, SOAP
+from conformance.contract.described import MOTION, ROS, SOAP, STATES
 from conformance.documents.openapi import Operation
 from conformance.scenarios.drawing import draw_requests
 from conformance.scenarios.scenario import NotPossibleError, scenario
@@ -105,7 +105,7 @@ def estimate(run: Run, operations: Sequence[Operation]) -> Estimate:
         generated = [_generated_counts(operation, effort) for operation in operations]
         covering, fuzzed = sum(pair[0] for pair in generated), sum(pair[1] for pair in generated)
     http, at_once = _http(operations, effort) if "http" in run.claims else (0, 0)
-    slow = tuple(name for name in (MOTION, ROS) if name in run.claims)
+    slow = tuple(name for name in (MOTION, ROS, STATES) if name in run.claims)
     return Estimate(_FIRST + surveyed + covering + fuzzed + http, fuzzed, at_once, slow, waits_s)
 
 
