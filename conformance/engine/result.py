@@ -252,7 +252,7 @@ def _api(robot: RobotUnderTest, causes: list[Cause]) -> dict[str, Any]:
         return {}
     findings = [cause.finding for cause in causes]
     return {
-        "api": robot.log.document(robot.rest.call_rules, findings, robot.rest.usual_status),
+        "api": robot.log.document(robot.rest.call_rules, findings, robot.rest.usual_status, robot.run.mapped_calls),
         **({"ros": list(robot.ros_ends.document(findings))} if robot.ros_ends else {}),
     }
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import parse_qsl
 
-from conformance.api.call_rules import CallRules
+from conformance.api.call_rules import CallRules, Reason
 from conformance.api.rest.left_behind import LeftBehind
 from conformance.api.rest.statuses import ANY_TIME, need_of
 from conformance.contract.pack import Contract
@@ -20,6 +20,7 @@ from conformance.documents.json_schema import Schema
 from conformance.documents.json_shape import shape_of
 from conformance.documents.openapi import Operation, is_json, matching, operations_of, resource_at
 from conformance.documents.wsdl_pack import label_in, services_of
+from conformance.statement.motion_calls import named_by
 from conformance.transport.exchange import Exchange, Listener, Request, Unanswered
 from conformance.verdict.finding import Finding
 
@@ -143,7 +144,11 @@ class OperationLog(Listener):
         return record
 
     def document(
-        self, rules: CallRules, findings: Iterable[Finding], usual_status: Mapping[str, int] = MappingProxyType({})
+        self,
+        rules: CallRules,
+        findings: Iterable[Finding],
+        usual_status: Mapping[str, int] = MappingProxyType({}),
+        mapped: Collection[str] = (),
     ) -> dict[str, Any]:
         """Return the matrix of operations and the coverage of the description, for result.json.
 
@@ -151,6 +156,7 @@ class OperationLog(Listener):
             rules: what may be called.
             findings: findings of the run.
             usual_status: status of the last usual request, by operation.
+            mapped: the calls that maps in the statement send in this run.
         """
         operations = operations_of(self._contract)
         numbers: dict[str, list[int]] = {}
@@ -161,6 +167,10 @@ class OperationLog(Listener):
             self._row(item, rules, usual_status) | {"findings": sorted(numbers.get(item.label, ()))}
             for item in operations
         ]
+        sent_by_maps = named_by(mapped, [item.label for item in operations])
+        for row in rows:
+            if row["operation"] in sent_by_maps and not row["called"]:
+                row["reason"] = f"{Reason.MAPPED}, and this run did not come to it"
         called = [item for item in operations if self._records[item.label].sent]
         info = self._contract.openapi.get("info")
         info = info if isinstance(info, dict) else {}

@@ -68,6 +68,13 @@ def test_the_matrix_counts_what_was_sent_and_seen(tmp_path):
 POSE = {"type": "object", "properties": {"x": {"type": "number"}, "frame": {"type": "string"}}}
 
 
+def test_what_a_map_would_have_sent_says_so(tmp_path):
+    log = OperationLog(contract_of(tmp_path, API), BASE)
+    rows = log.document(CallRules(), (), mapped=["DELETE /joints/{name}"])["operations"]
+    assert rows[1]["reason"] == "the map in the statement names it, and this run did not come to it"
+    assert log.document(CallRules(), ())["operations"][1]["reason"].startswith("it may change something")
+
+
 @pytest.mark.parametrize(
     ("schema", "value", "shown", "hidden"),
     [
