@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from fnmatch import fnmatchcase
@@ -26,6 +26,22 @@ HARMFUL: Final = frozenset(
         "login", "logout", "token", "password", "secret", "credentials",
     }
 )  # fmt: skip
+# Those of them that say so as a value too, such as one of the commands that a parameter has.
+_AS_VALUES: Final = frozenset(
+    {
+        "shutdown",
+        "poweroff",
+        "reboot",
+        "restart",
+        "erase",
+        "wipe",
+        "destroy",
+        "factory",
+        "uninstall",
+        "kill",
+        "terminate",
+    }
+)
 _SEVERAL: Final = frozenset(f"{word}s" for word in HARMFUL - {"format"})
 # Things whose upload changes nothing else.
 _RECORDS: Final = frozenset(
@@ -52,7 +68,7 @@ class Reason(StrEnum):
     MOVES = "it moves the device: --allow-motion allows it"
     NEVER = "--never excludes it"
     EXCLUDED = "the description excludes it (x-roaas-never)"
-    HARMFUL = "its name warns of harm: --call with its full method and path allows it"
+    HARMFUL = "its name, or a value of it, warns of harm: --call with its full method and path allows it"
 
     @property
     def may(self) -> bool:
@@ -122,14 +138,25 @@ def is_literal(pattern: str, operation: Operation) -> bool:
 
 @lru_cache(maxsize=1024)
 def harmful_words(operation: Operation) -> tuple[str, ...]:
-    """Return the words in an operation's path, id and tags that say that it may do harm."""
+    """Return the words in an operation's path, id, tags and declared values that say that it may do harm."""
     text = f"{_PARAMETER.sub(' ', operation.template)} {operation.id}"
     # A tag names a group of operations: its words are no warning for an operation that only reads.
     text += "" if operation.safe else f" {' '.join(operation.tags)}"
     words = words_of(text) - _OF_METHODS.get(operation.method, frozenset())
     words -= {"upload", "uploads"} if words & _RECORDS else set()
     words -= {"update"} if operation.created else set()
-    return tuple(sorted(words & (HARMFUL | _SEVERAL)))
+    values = {"".join(_WORD.findall(value)).lower() for value in _declared_values(operation)}
+    return tuple(sorted((words & (HARMFUL | _SEVERAL)) | (values & _AS_VALUES)))
+
+
+def _declared_values(operation: Operation) -> Iterator[str]:
+    """Yield the texts that an operation's parameters and the members of its bodies may be."""
+    schemas = [parameter.schema for parameter in operation.parameters if parameter.where in {"path", "query"}]
+    bodies = (body.schema.get("properties", {}) for body in operation.bodies.values() if isinstance(body.schema, dict))
+    schemas += [member for members in bodies for member in members.values()]
+    for schema in schemas:
+        given = schema.get("enum", ()) if isinstance(schema, dict) else ()
+        yield from (value for value in given if isinstance(value, str))
 
 
 def words_of(text: str) -> set[str]:

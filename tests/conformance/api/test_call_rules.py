@@ -3,10 +3,16 @@
 import pytest
 
 from conformance.api.call_rules import CallRules, Reason, plan_lines
-from conformance.documents.openapi import Operation, read_operations
+from conformance.documents.openapi import Body, Operation, read_operations
+from conformance.documents.parameters import Parameter
 
 _GOTO = Operation("goTo", "POST", "/move/goto", tags=("move",))
 _READ = Operation("", "GET", "/state/{id}")
+
+
+_COMMAND = {"enum": ["beep", "Shut-Down"]}
+_ADMIN = Operation("", "POST", "/admin/{command}", parameters=(Parameter("command", "path", True, _COMMAND),))
+_POWER = Operation("", "POST", "/power", bodies={"application/json": Body("", {"properties": {"do": _COMMAND}})})
 
 
 @pytest.mark.parametrize(
@@ -50,6 +56,9 @@ _READ = Operation("", "GET", "/state/{id}")
         (Operation("", "GET", "/a", motion=True), CallRules(), Reason.MOVES),
         (Operation("", "GET", "/a", motion=True), CallRules(motion=True), Reason.ALLOWED),
         (Operation("", "GET", "/a", never=True), CallRules(("GET /a",)), Reason.EXCLUDED),
+        (_ADMIN, CallRules(("*",)), Reason.HARMFUL),
+        (_ADMIN, CallRules(("POST /admin/{command}",)), Reason.ALLOWED),
+        (_POWER, CallRules(("*",)), Reason.HARMFUL),
         # The author of a contract has decided.
         (Operation("", "POST", "/system/shutdown"), CallRules(by_author=True), Reason.ALLOWED),
         (Operation("", "GET", "/a", motion=True), CallRules(by_author=True), Reason.MOVES),

@@ -70,7 +70,7 @@ def test_the_statement_is_written_and_can_be_read(folder, arguments):
         "# Called are 3 of 7 operations.",
         "  # -- jobs\n  # called: GET /api/jobs/{job_id}\n",
         '  # "DELETE /api/jobs/{job_id}",  # it may change something\n',
-        '  # -- update\n  # "POST /api/firmware",  # its name warns of harm\n',
+        '  # -- update\n  # "POST /api/firmware",  # its name, or a value of it, warns of harm\n',
         "  # -- health\n  # called: GET /health\n",
         "  # sent at the end, to stop the device: PUT /brake\n",
         '  # "PUT /speed",  # it may change something; it moves the device, so --allow-motion too\n',
