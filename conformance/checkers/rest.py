@@ -19,6 +19,7 @@ from conformance.checkers.identities import Identities, Uniques
 from conformance.checkers.lists import Lists
 from conformance.checkers.memory import Memory
 from conformance.checkers.occasion import Occasion
+from conformance.checkers.representations import Representations
 from conformance.checkers.resources import Resources
 from conformance.checkers.siblings import Siblings
 from conformance.checkers.texts import Texts
@@ -52,7 +53,7 @@ class Histories:
         # Checkers that remember values which a request of unknown effect may change.
         self._states = (
             Writes(contract), Changes(contract), Untouched(contract), Answers(contract), Commands(contract),
-            Parts(contract), Siblings(contract), Elsewhere(contract),
+            Parts(contract), Siblings(contract), Elsewhere(contract), Representations(contract),
         )  # fmt: skip
         self._checkers = (
             Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory, *self._states,

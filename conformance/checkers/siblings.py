@@ -16,6 +16,7 @@ from conformance.api.rest.references import collections_of
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import collection_of, identifier_of, is_devices, is_shared, parts_of
 from conformance.checkers.occasion import MOST_OCTETS, Occasion
+from conformance.checkers.representations import is_telling
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.json_text import clip, read_json
@@ -84,6 +85,9 @@ class Siblings:
     def _take_write(self, occasion: Occasion, operation: Operation | None, path: str) -> None:
         request = occasion.request
         is_item = operation is not None and operation.template.rstrip("/") in self._items
+        if operation is not None and not is_item and request.method in {"PUT", "PATCH"}:
+            # A write to a part of a thing is one to the thing.
+            is_item, path = operation.template.rstrip("/").rpartition("/")[0] in self._items, path.rpartition("/")[0]
         body = operation.bodies.get(request.media_type) if operation is not None else None
         sent = read_json(request.body).value if len(request.body) <= MOST_OCTETS else None
         above = path.rpartition("/")[0].casefold()
@@ -123,7 +127,10 @@ class Siblings:
     def _is_by(self, write: _Write, item: Operation, name: str, now: Any) -> bool:
         """Return whether a write has changed a member of another thing: to the sent value, or always to one value."""
         part, label = write.parts.get(name), write.operation.label
-        if name in write.sent and same(write.sent[name], now):
+        # The thing may have another name for a member of its part.
+        is_part = write.operation.template.rstrip("/") not in self._items
+        sent = [one for key, one in write.sent.items() if key == name or (is_part and is_telling(one))]
+        if any(same(one, now) for one in sent):
             self._taken[label, name].add(clip(now))
             # No device comes by itself to a text of the suite's.
             return len(self._taken[label, name]) >= _TWICE or "roaas" in str(now)

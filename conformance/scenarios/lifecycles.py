@@ -36,6 +36,7 @@ from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
 from conformance.scenarios.chosen import Chosen
 from conformance.scenarios.living import ABSENT, Kind, Life, Living, State, Thing
+from conformance.scenarios.parts import write_parts
 from conformance.scenarios.refusing import is_refused, look_refused, refuse_changes, refuse_creation, refuse_deletion
 from conformance.scenarios.scenario import NotPossibleError, NotSeenError, scenario
 from conformance.scenarios.singletons import is_free, singletons
@@ -77,6 +78,7 @@ def lifecycles(api: RestInterface, values: Values) -> tuple[Life, ...]:
                 lives += _seen_twice(partial(_Cycle, Writer(api, values), create, read, operations, held))
     _look_beside(Writer(api, values), operations)
     lives += singletons(Writer(api, values), operations)
+    write_parts(Writer(api, values), operations)
     if held and not lives:
         raise NotSeenError(held_text(held, set(held.values())))
     if not lives:

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from conformance.api.call_rules import HARMFUL, words_of
 from conformance.api.rest.applicable import callable_operations
-from conformance.api.rest.inputs import request_of, usual_inputs
+from conformance.api.rest.inputs import usual_inputs
 from conformance.api.rest.samples import alike_and_apart, fits
 from conformance.api.rest.things import another, differences, is_devices
 from conformance.documents.json_schema import Schema, is_number, kinds_of
@@ -62,40 +62,7 @@ def singletons(writer: Writer, operations: Mapping[tuple[str, str], Operation]) 
         with writer.api.run.limit.lift(), suppress(NoAnswerError):  # the survey reports a broken connection
             if writes := _write_values(writer, read, write):
                 lives.append(Life("", read.label, writes[0].sent, writes[0].found, writes=tuple(writes)))
-    parts = [
-        (operations["GET", above], write)
-        for (method, path), write in operations.items()
-        if method in {"PUT", "PATCH"} and ("GET", path) not in operations and write.bodies and is_free(write, path)
-        if ("GET", above := path.rpartition("/")[0]) in operations
-    ]
-    for read, write in parts[:_RESOURCES]:
-        writer.api.run.limit.check()
-        with writer.api.run.limit.lift(), suppress(NoAnswerError):
-            _write_part(writer, read, write)
     return lives
-
-
-def _write_part(writer: Writer, read: Operation, write: Operation) -> None:
-    """Write the limits of numbers to a part of a thing that has no read of its own, and read the thing after each.
-
-    What the device refuses, because it allows less, must not change the thing.
-    """
-    usual, media_type = usual_inputs(write, writer.values)[0].body, next(iter(write.bodies))
-    at = request_of(read, usual_inputs(read, writer.values)[0]).target.partition("?")[0]
-    before = members(writer.send(read, at), ())
-    parts = flat(write.bodies[media_type].schema).get("properties", {})
-    if not isinstance(usual, dict) or not before.keys() & usual.keys():
-        return
-    for name, part in parts.items():
-        limits: list[Any] = [flat(part).get(key) for key in ("minimum", "maximum")] if name in before else []
-        # Two values near the greatest one: a single one that is there afterwards may be chance.
-        is_range = bool(limits) and all(map(is_number, limits))
-        near = [limits[1] - type(limits[1])((limits[1] - limits[0]) / 10)] if is_range else []
-        for value in filter(is_number, [*near, *reversed(limits)]):
-            writer.send(write, at + write.template[len(read.template) :], {**usual, name: value})
-            writer.send(read, at)
-    restored = {name: before[name] for name in usual if name in before and fits(parts.get(name, {}), before[name])}
-    writer.send(write, at + write.template[len(read.template) :], {**usual, **restored})
 
 
 def is_free(write: Operation, path: str) -> bool:

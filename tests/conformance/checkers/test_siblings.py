@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from small_device import REFUSED, answers, contract_of, described
+from small_device import REFUSED, answers, body_of, contract_of, described, object_of
 
 from conformance.api.rest.things import another
 from conformance.checkers.rest import RestCheckers
@@ -20,12 +20,14 @@ _LAMP = {
         "order": {"type": "integer"},
     },
 }
+_ANY = {"type": "number"}
 _ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
 _OK = {"200": answers(_LAMP), "4XX": REFUSED}
 _PUT = {"requestBody": {"content": {"application/json": {"schema": _LAMP}}}, "responses": _OK}
 _PATHS = {
     "/lamps": {"get": {"responses": {"200": answers({"type": "array", "items": _LAMP})}}},
     "/lamps/{id}": {"parameters": [_ID], "get": {"responses": _OK}, "put": _PUT},
+    "/lamps/{id}/dimming": {"parameters": [_ID], "put": {**_PUT, "requestBody": body_of(object_of(percent=_ANY))}},
     "/lamps/{id}/blink": {"parameters": [_ID], "post": {"responses": _OK}},
 }
 
@@ -37,6 +39,10 @@ def _contract(tmp_path_factory):
 
 def _put(id_, **members):
     return "PUT", f"/lamps/{id_}", members, {"id": id_, **members}
+
+
+def _dim(id_, percent):
+    return "PUT", f"/lamps/{id_}/dimming", {"percent": percent}, {"id": id_, "level": percent}
 
 
 def _get(id_, **members):
@@ -62,9 +68,14 @@ _BROKEN = {
         _list(a=0, b=1), _put("a", level=5), _list(a=5, b=5), _put("a", level=6), _list(a=6, b=6)
     ],
     "others lose a member": [*_STILL, *_FALLS],
+    "a part of another, by another name": [
+        _list(a=2, b=3), _dim("a", 50), _list(a=50, b=50), _dim("a", 60), _list(a=60, b=60),
+    ],
 }  # fmt: skip
 _RIGHT = {
     "each has its own": [_list(a=0, b=1), _put("a", level=5), _list(a=5, b=1), _put("b", level=6), _list(a=5, b=6)],
+    "each has its own part": [_list(a=2, b=3), _dim("a", 50), _list(a=50, b=3), _dim("b", 60), _list(a=50, b=60)],
+    "a part that has the same value once": [_list(a=2, b=3), _dim("a", 50), _list(a=50, b=50), _dim("a", 60)],
     "once, by chance": [_get("b", level=1), _put("a", level=5), _get("b", level=5), _put("a", level=6)],
     "a level that moves": [
         _get("b", level=1), _get("b", level=2), _put("a", level=5), _get("b", level=5), _put("a", level=6),
