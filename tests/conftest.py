@@ -1,11 +1,14 @@
 """Fixtures for every room's tests, such as a ROS domain of one's own, and the order in which processes share tests."""
 
 import gc
+import inspect
 import itertools
 import os
 import signal
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -14,6 +17,7 @@ from hypothesis import settings
 from xdist.scheduler import LoadFileScheduling
 
 from conformance.commandline.secrecy import SECRETS
+from conformance.contract.pack import Contract
 from proof.selftest.robots import own_domain
 
 # How long an example takes is the machine's affair, which others may use as well. Every run has the same examples.
@@ -47,9 +51,8 @@ _HALF_OF_LOAD_TESTS = {f"tests/loadtests/test_load_{name}.py" for name in _HALF}
 
 #: Their tests share nothing, and wait for most of their minutes.
 _APART = (
-    "test_ros_gateway.py", "test_ros_proposals.py", "test_sprinklers.py", "test_wired_device.py", "test_lost_robot.py",
-    "test_lost_device.py", "test_secrets.py", "test_things_that_end.py", "test_bombs.py", "test_certify_command.py",
-    "test_endings.py",
+    "test_ros_proposals.py", "test_lost_robot.py", "test_lost_device.py", "test_secrets.py", "test_bombs.py",
+    "test_certify_command.py", "test_endings.py",
 )  # fmt: skip
 
 
@@ -99,6 +102,7 @@ class _Failures:
 @pytest.hookimpl(trylast=True)  # pytest makes the reporter in this hook
 def pytest_configure(config: pytest.Config) -> None:
     """Name failing tests on a terminal, which gw0, gw1, ... have not."""
+    config.addinivalue_line("markers", "side_by_side(at_once): of tests that mostly wait, and measure no latencies")
     if terminal := config.pluginmanager.get_plugin("terminalreporter"):
         config.pluginmanager.register(_Failures(terminal))
 
@@ -146,6 +150,45 @@ def _no_secrets() -> Iterator[None]:
     SECRETS.forget()
     yield
     SECRETS.forget()
+
+
+#: So many tests of a module that are marked `side_by_side` go on at a time, unless their mark says another number.
+_AT_ONCE = 3
+
+
+def _call(test: pytest.Function, folder: Path) -> None:
+    names = inspect.signature(test.function).parameters
+    with ExitStack() as held:
+        given = dict(test.callspec.params) if hasattr(test, "callspec") else {}
+        given |= {"tmp_path": folder} if "tmp_path" in names else {}
+        given |= {"domain_id": held.enter_context(own_domain(_first_domain_id()))} if "domain_id" in names else {}
+        test.function(**given)
+
+
+@pytest.fixture(scope="module")
+def _begun(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[dict[str, Future[None]]]:
+    """Begin the selected tests of a module in threads, some at a time."""
+    Contract.load()  # threads that begin to read one kind of TOML at once have crashed msgspec
+    every = {one: one.get_closest_marker("side_by_side") for one in request.session.items if one.path == request.path}
+    tests = [one for one, mark in every.items() if mark]
+    at_once = every[tests[0]].args or (_AT_ONCE,)
+    with pytest.MonkeyPatch.context() as patched, ThreadPoolExecutor(*at_once) as pool:
+        patched.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        yield {one.nodeid: pool.submit(_call, one, tmp_path_factory.mktemp("beside")) for one in tests}
+        pool.shutdown(cancel_futures=True)
+
+
+@pytest.fixture(autouse=True)
+def _side_by_side(request: pytest.FixtureRequest) -> None:
+    """Await the thread of a test that is marked `side_by_side`, instead of calling it.
+
+    It may have parameters, `tmp_path` and `domain_id`. Others of the module stand before it, or begin after it.
+    """
+    if request.node.get_closest_marker("side_by_side"):
+        begun = request.getfixturevalue("_begun")[request.node.nodeid]
+        request.node.obj = lambda **_: begun.result()
 
 
 @pytest.fixture

@@ -25,6 +25,7 @@ from pathlib import Path
 from pkgutil import walk_packages
 from select import select
 from signal import signal as set_signal
+from threading import Lock
 
 from conformance.commandline.endings import PARENT_VARIABLE
 
@@ -72,7 +73,6 @@ sys.exit(code)
 """
 
 
-@cache
 def beginning(kind: str = "commands") -> tuple[str, ...]:
     """Return the words that stand for `python` before `-m roaas` or `-c ...`; start the server for them.
 
@@ -81,6 +81,12 @@ def beginning(kind: str = "commands") -> tuple[str, ...]:
     """
     if sys.platform != "linux":
         return (sys.executable,)
+    with _STARTING:
+        return _started(kind)
+
+
+@cache
+def _started(kind: str) -> tuple[str, ...]:
     name = f"roaas-tests-{os.getpid()}-{secrets.token_hex(8)}"
     # The server ends when this process does, which holds the other end of its stdin.
     server = subprocess.Popen(
@@ -95,6 +101,8 @@ def beginning(kind: str = "commands") -> tuple[str, ...]:
     return (sys.executable, "-I", "-S", "-c", _CLIENT, name)
 
 
+# Tests that go on side by side share one server.
+_STARTING = Lock()
 _SERVERS: list[subprocess.Popen[bytes]] = []
 
 

@@ -14,6 +14,7 @@ from moving_device import DESCRIPTION, MAP, Mover
 from processes import ended
 from small_device import small_device
 
+pytestmark = pytest.mark.side_by_side
 _MOUNTED = 'mount -t tmpfs -o size=4m none "$0" && exec "$@"'
 _CERTIFY = ("certify", "--effort", "quick", "--class", "motion")
 _LOAD = ("load", "--operation", "PUT /velocity", "--call", "PUT /velocity", "--rate=50", "--duration=10", "--warmup=0")

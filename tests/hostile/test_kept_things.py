@@ -1,12 +1,12 @@
-"""Devices that keep things: right ones of many styles are not blamed, and each fault is found by its requirement."""
-
-from concurrent.futures import ThreadPoolExecutor
+"""Devices that keep things, settings and values: right ones of many styles are not blamed, each fault is found."""
 
 import pytest
+import written_device
+from settings_device import FIRST, Settings, lived
 from things_device import Things, blamed
+from written_device import Written
 
-# Most of a life is waiting.
-_AT_ONCE = 12
+pytestmark = pytest.mark.side_by_side(8)
 _STYLES = {
     "plain": (),
     "eventual": ("later",),
@@ -64,25 +64,61 @@ _FAULTS = [
 ]
 
 
-@pytest.fixture(scope="module")
-def found(tmp_path_factory):
-    """Return by what each device is blamed, by fault and style."""
-    devices = [("", style) for style in _STYLES.values()] + [(fault, style) for fault, style, _ in _FAULTS]
-    folders = [tmp_path_factory.mktemp("things") for _ in devices]
-
-    def lived(device, folder):
-        fault, style = device
-        return blamed(*Things(style, fault).description(), folder)
-
-    with ThreadPoolExecutor(_AT_ONCE) as pool:
-        return dict(zip(devices, pool.map(lived, devices, folders), strict=True))
-
-
 @pytest.mark.parametrize("style", _STYLES)
-def test_a_right_device_is_not_blamed(style, found):
-    assert found["", _STYLES[style]] == {}
+def test_a_right_device_is_not_blamed(style, tmp_path):
+    assert blamed(*Things(_STYLES[style], "").description(), tmp_path) == {}
 
 
 @pytest.mark.parametrize(("fault", "style", "requirement"), _FAULTS)
-def test_a_fault_is_found(fault, style, requirement, found):
-    assert requirement in found[fault, style]
+def test_a_fault_is_found(fault, style, requirement, tmp_path):
+    assert requirement in blamed(*Things(style, fault).description(), tmp_path)
+
+
+_SETTINGS = [(), ("patch",), ("later",), ("wrapped",), ("sensors",), ("locking",), ("strict",), ("acting",)]
+_LOST = [
+    ("zero", ()),
+    ("zero", ("patch",)),
+    ("false", ("wrapped",)),
+    ("empty list", ()),
+    ("maximum", ("locking",)),
+    ("one of an enumeration", ()),
+    ("every write", ()),
+    ("another connection reads the old", ()),
+    ("another connection reads the old", ("sensors",)),
+]
+
+
+@pytest.mark.parametrize("style", _SETTINGS)
+def test_right_settings_are_not_blamed_and_left_as_they_were(style, tmp_path):
+    device = Settings(style, "")
+    assert lived(device, tmp_path) == []
+    # The last request has restored what was there; how the device is reached was not touched.
+    assert {**FIRST, **device.written[-1]} == FIRST
+    assert {one.get("ssid", "home") for one in device.written} == {"home"}
+
+
+@pytest.mark.parametrize(("fault", "style"), _LOST)
+def test_a_lost_value_is_found(fault, style, tmp_path):
+    assert lived(Settings(style, fault), tmp_path) != []
+
+
+_BROKEN = {
+    "read-only": ("built_at by PUT", "built_at by PATCH"),
+    "defaults": ("default of loud by POST", "default of loud by PUT"),
+    "patch": ("null keeps", "objects replaced", "steps added", "patch without effect"),
+    "written-is-read": ("speed cut off", "steps sorted", "note escaped"),
+    "refused-keeps": ("refused in part", "last test ignored", "applied in part"),
+    "own-identifier": ("code twice by PATCH",),
+    "deleted-is-gone": ("lists the deleted by kind",),
+}
+_BY_FAULT = {fault: f"description/{name}" for name, faults in _BROKEN.items() for fault in faults}
+
+
+@pytest.mark.parametrize("style", [(), ("marked",)])
+def test_right_values_are_not_blamed(style, tmp_path):
+    assert written_device.blamed(Written(style, ""), tmp_path) == {}
+
+
+@pytest.mark.parametrize("fault", _BY_FAULT)
+def test_a_fault_of_written_values_is_found(fault, tmp_path):
+    assert _BY_FAULT[fault] in written_device.blamed(Written(("marked",), fault), tmp_path)

@@ -57,6 +57,7 @@ _RUNS = (
 )
 
 
+@pytest.mark.side_by_side
 @pytest.mark.parametrize("faults", _RUNS, ids=range(1, len(_RUNS) + 1))
 def test_faults_under_a_condition_are_found(faults, tmp_path):
     selected = [f"--select={id_}" for id_ in sorted({id_ for id_, _ in faults.values()})]

@@ -72,6 +72,7 @@ def test_right_codings(kind, tmp_path):
     assert not done.blamed, done.text
 
 
+@pytest.mark.side_by_side
 @pytest.mark.parametrize(
     ("kind", "blamed"),
     [

@@ -140,6 +140,7 @@ def test_a_right_kiln_is_reached_and_not_blamed(tmp_path):
     assert "never answered 2xx" not in done.text
 
 
+@pytest.mark.side_by_side
 @pytest.mark.parametrize(
     ("fault", "requirement"),
     [

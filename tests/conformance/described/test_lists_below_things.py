@@ -9,6 +9,7 @@ import pytest
 from aiohttp import web
 from small_device import REFUSED, answers, body_of, certified, described, error, object_of, reading, small_device
 
+pytestmark = pytest.mark.side_by_side
 _SHELF = object_of("id", "name", id={"type": "integer"}, name={"type": "string"})
 _NEW = object_of("name", name={"type": "string", "minLength": 1})
 _NOTE = object_of(

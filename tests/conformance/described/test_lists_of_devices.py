@@ -5,6 +5,7 @@ import re
 import time
 from urllib.parse import urlencode
 
+import pytest
 from aiohttp import web
 from small_device import (
     REFUSED,
@@ -19,6 +20,7 @@ from small_device import (
     small_device,
 )  # fmt: skip
 
+pytestmark = pytest.mark.side_by_side
 LIMIT, FILTER, ORDER, TOTAL, PAGES = (
     f"description/list-{name}" for name in ("limit", "filter", "order", "total", "pages")
 )

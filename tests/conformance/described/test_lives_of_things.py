@@ -199,6 +199,7 @@ class _Lamps:
         return web.Response(body=lamp[1], content_type="image/png")
 
 
+@pytest.mark.side_by_side
 @pytest.mark.parametrize(
     ("fault", "blamed"),
     [

@@ -24,12 +24,15 @@ def _blamed(style, faults, tmp_path, *more):
     return done.blamed, f"{done.text}{said}"
 
 
-@pytest.mark.parametrize("style", RIGHT)
+@pytest.mark.parametrize(
+    "style", [*RIGHT][:1] + [pytest.param(one, marks=pytest.mark.side_by_side) for one in [*RIGHT][1:]]
+)
 def test_a_right_style_is_not_blamed(style, tmp_path):
     blamed, text = _blamed(style, (), tmp_path, *(() if style == "as described" else _CLASSES))
     assert not blamed, text
 
 
+@pytest.mark.side_by_side
 @pytest.mark.parametrize("number", range(len(FAULTS)))
 def test_faults_are_found(number, tmp_path):
     style, faults = FAULTS[number]

@@ -244,6 +244,7 @@ def test_a_right_device_of_things_that_end_is_not_blamed(name, tmp_path):
     assert not blamed, text
 
 
+@pytest.mark.side_by_side
 @pytest.mark.parametrize("name", _BROKEN)
 def test_a_fault_of_things_that_end_is_found(name, tmp_path):
     make, style, requirement = _BROKEN[name]

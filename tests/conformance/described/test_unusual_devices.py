@@ -47,6 +47,7 @@ def test_a_right_device_is_not_blamed(device, arguments, tmp_path):
     assert done.requirement("description/file-valid")["verdict"] == "pass"
 
 
+@pytest.mark.side_by_side
 @pytest.mark.parametrize(
     ("device", "arguments", "faults"),
     [(device, arguments, faults) for device, arguments, runs in _DEVICES for faults in runs],

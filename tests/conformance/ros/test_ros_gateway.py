@@ -81,7 +81,7 @@ CORE = ("read-exact", "read-fresh", "read-newest", "write-exact", "once", "order
 
 #: Most of a run's time is waiting: of 20 to 220 s, a busy machine makes more.
 _MOST_S = 800
-pytestmark = pytest.mark.timeout(_MOST_S + 100)
+pytestmark = [pytest.mark.timeout(_MOST_S + 100), pytest.mark.side_by_side(5)]
 
 
 def _judged(statement, domain_id, *options, select=(), code=None):
@@ -167,6 +167,9 @@ def test_what_is_missing_is_named(tmp_path, domain_id):
         statement.write_text(whole.replace("GET /state/odom", "GET /odometry"), encoding="utf-8")
         said, *_ = _judged(statement, domain_id, "--ros-play", code=2)
         assert "[ros.operations] names 'GET /odometry', which the description does not have" in said
+        statement.write_text(whole, encoding="utf-8")
+        _keep(statement, ["/odom", "/cmd_vel"])
+        whole = statement.read_text(encoding="utf-8")
         statement.write_text(whole.replace("nav_msgs/msg/Odometry", "nope_msgs/msg/Odometry"), encoding="utf-8")
         _, judged, out = _judged(statement, domain_id, "--ros-play", "--effort", "quick", select=["read-exact"], code=4)
         assert judged["read-exact"] == "skip"

@@ -13,6 +13,7 @@ from conformance.documents.wsdl import read_services
 from conformance.documents.xsd_shapes import Simple, is_alike
 from conformance.transport.exchange import Exchange, Request, Response
 
+pytestmark = pytest.mark.side_by_side
 _SELECTED = ("soap/lists", "soap/states", "soap/written-is-read", "soap/deleted-is-gone")
 _FAULTS = (
     {"filter ignored": ("soap/lists", "an item with"), "starts again": ("soap/states", "StartJob")},
