@@ -1,5 +1,9 @@
-"""A generator's own mistake is an error of the suite, with exit code 4, and never the robot's failure."""
+"""What ends a run early: an error of the suite is exit code 4 and not the robot's; a broken run never looks whole."""
 
+import gc
+import os
+import signal
+import sys
 from dataclasses import replace
 
 import pytest
@@ -8,6 +12,7 @@ from conformance.api.rest import calls
 from conformance.contract.pack import Contract
 from conformance.documents.xml import Node
 from conformance.engine.certification import certify
+from conformance.engine.progress import note_signals
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.packs.table1.robot import delivery, soap_services
 from conformance.packs.table1.statement import Statement
@@ -79,3 +84,36 @@ def test_a_mistake_of_the_suite_s_own_is_no_failure(statement, tmp_path, monkeyp
     (item,) = outcome.document["requirements"]
     assert (outcome.exit_code, item["verdict"]) == (4, "error"), item
     assert "HarnessError" in item["reason"]
+
+
+class _Finalized:
+    def __init__(self, number):
+        self._number = number
+
+    def __del__(self):
+        os.kill(os.getpid(), self._number)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_that_is_swallowed_is_remembered(number, monkeypatch):
+    ignored = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda args: ignored.append(args.exc_type))
+    run = Run()
+    before = signal.getsignal(number)
+    with note_signals(run):
+        dying = _Finalized(number)
+        del dying
+        gc.collect()
+    assert (ignored, run.interrupted) == ([KeyboardInterrupt], True)
+    assert signal.getsignal(number) is before
+
+
+def test_a_run_with_a_swallowed_interruption_ends_as_interrupted(tmp_path, monkeypatch):
+    robot = RobotUnderTest(Run())
+
+    def connect(_progress) -> None:
+        robot.run.interrupted = True
+
+    monkeypatch.setattr(robot, "connect", connect)
+    ended = certify(robot, tmp_path, progress=None)
+    assert (ended.exit_code, ended.document["interrupted"]) == (130, True)

@@ -1,4 +1,4 @@
-"""A robot with one fault has one finding, however many checks meet it: seen with real servers."""
+"""A robot with one fault has one finding, however many checks meet it; smaller requests than one."""
 
 import json
 import sys
@@ -11,10 +11,12 @@ from toy_server import Handler, server_of
 from conformance.cli.summary import print_summary
 from conformance.contract.pack import Contract
 from conformance.engine.certification import certify
+from conformance.engine.lost_device import smaller
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import empty_statement
 from conformance.transport.client import Connection
+from conformance.transport.exchange import Request
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
@@ -152,3 +154,45 @@ def test_in_somebody_elses_project_one_cause_fails_one_test(tmp_path):
     assert "1 failed, 1 skipped" in done.stdout, done.stdout
     assert "Sent `GET /robot/sensors/`. Expected a response (rest-resources/sensors-type" in done.stdout
     assert "Not tested, because of a failure before: GET /robot/sensors/: no response" in done.stdout
+
+
+_JSON = (("Accept", "*/*"), ("Content-Type", "application/json"))
+
+
+def _minimal(request: Request, does) -> Request:
+    """Return the request that is left when no smaller one does it."""
+    while (less := next(filter(does, smaller(request)), None)) is not None:
+        request = less
+    return request
+
+
+def test_a_parameter_that_does_it_stays_alone():
+    request = Request("GET", "http://arm/pose?x=1&z=1e308&y=2", (("Accept", "*/*"), ("X-Trace", "1")))
+    assert _minimal(request, lambda one: "z=1e308" in one.url) == Request("GET", "http://arm/pose?z=1e308", _JSON[:1])
+
+
+def test_a_member_that_does_it_stays_with_those_around_it():
+    body = json.dumps({"name": "a", "pose": {"x": 1.0, "z": 1e308, "joints": [1, 2, -1]}, "speed": 3}).encode()
+
+    def does(one: Request) -> bool:
+        return b"1e+308" in one.body
+
+    found = _minimal(Request("POST", "http://arm/move", _JSON, body), does)
+    assert json.loads(found.body) == {"pose": {"z": 1e308}}
+    assert found.headers == _JSON
+
+
+def test_a_long_text_becomes_shorter():
+    body = json.dumps({"text": "a" * 10_000}).encode()
+    found = _minimal(Request("POST", "http://arm/say", _JSON, body), lambda one: len(one.body) > 1000)
+    assert 1000 < len(found.body) < 2600
+
+
+def test_no_part_is_taken_twice_and_nothing_is_taken_from_nothing():
+    assert list(smaller(Request("GET", "http://arm/pose", _JSON[:1]))) == []
+    assert list(smaller(Request("GET", "http://arm/", (), b"", b"raw"))) == []
+
+
+def test_what_is_no_json_is_halved():
+    (empty, half) = smaller(Request("PUT", "http://arm/", _JSON[:1], b"\xff\xfe\x00\x01"))
+    assert (empty.body, half.body) == (b"", b"\xff\xfe")

@@ -3,15 +3,12 @@
 import sys
 
 import mutants
-import pytest
 import rover
 from arm import LIMITS, Arm
 from body import Body
 from judged_devices import MOVES, judged_by_map, of_arm, passed_but
 from processes import ended
 from rover import Rover, serving_rover
-
-pytestmark = pytest.mark.side_by_side
 
 
 def test_a_right_arm_is_not_blamed(tmp_path):

@@ -1,4 +1,4 @@
-"""Ledger, checks, mutants and the coverage page agree."""
+"""Ledger, checks, mutants and the coverage page agree; what a row of a mutant may say."""
 
 import shutil
 from pathlib import Path
@@ -9,9 +9,10 @@ from conformance.contract.classes import Level
 from conformance.contract.ledger import classes_of
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
-from proof.mutation.messages import unchanged
+from proof.mutation import changes, fields
+from proof.mutation.messages import Request, Response, unchanged
 from proof.mutation.self_test import SelfTest
-from proof.mutation.table import Mutant
+from proof.mutation.table import Mutant, read_rows
 from proof.selftest import coverage
 from proof.table1.mutants import MUTANTS
 
@@ -97,3 +98,45 @@ def test_a_module_with_checks_that_cannot_be_imported_is_named(tmp_path):
     broken.write_text("import no_such_module\n", encoding="utf-8")
     with pytest.raises(ContractError, match=r"test_broken\.py cannot be imported"):
         coverage.checks_by_requirement(Contract.load(tmp_path / "lamp"))
+
+
+_WORDS = {"things": vars(changes) | {"GOAL": "/goal/", "fields": fields}}
+_REQUEST = Request("rest", "GET", "/goal/")
+
+
+def _mutants(folder, row):
+    path = folder / "rows.toml"
+    path.write_text(f"[things.rest.http]\n{row}\n", encoding="utf-8")
+    return list(read_rows(path, _WORDS))
+
+
+@pytest.mark.parametrize(
+    ("change", "body"),
+    [
+        ("altered(rest('GET', GOAL), becomes(404))", b'{"x": 1}'),
+        ("altered(rest(), values(fields.field('x', -2.5)), nth=1)", b'{"x": -2.5}'),
+        ("instead(rest('PUT GET', GOAL), plain(404, b'gone', JSON, ('Allow', 'GET')))", b"gone"),
+        ("always(unwanted)", None),
+    ],
+)
+def test_a_row_names_where_which_operator_and_when(tmp_path, change, body):
+    (mutant,) = _mutants(tmp_path, f'broken = ["date", "It is broken.", "{change}", {{ probe = true }}]')
+    assert (mutant.name, mutant.catches, mutant.interface, mutant.probe) == ("broken", ("http/date",), "rest", True)
+    if body is not None:
+        sent = mutant.make()(_REQUEST, lambda _: Response(200, [("Content-Type", "application/json")], b'{"x": 1}'))
+        assert sent.body == body
+
+
+@pytest.mark.parametrize(
+    ("change", "error"),
+    [
+        ("altered(nowhere(), becomes(404))", KeyError),
+        ("instead(lambda request: True, plain(204))", ValueError),
+        ("(1).__class__", ValueError),
+        ("GOAL.__class__", ValueError),
+        ("altered(", SyntaxError),
+    ],
+)
+def test_a_row_has_words_and_values_alone(tmp_path, change, error):
+    with pytest.raises(error):
+        _mutants(tmp_path, f'broken = ["date", "It is broken.", "{change}"]')
