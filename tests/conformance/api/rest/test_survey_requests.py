@@ -19,6 +19,7 @@ from conformance.api.rest.variations import (
     valid_variations,
 )
 from conformance.documents.openapi import read_operations
+from conformance.documents.writing import json_text
 from conformance.transport.exchange import Exchange, Request, Response
 
 _POSE = {
@@ -328,10 +329,8 @@ def test_odd_values_can_be_sent():
         assert all("\r" not in value and "\n" not in value and "\x00" not in value for _, value in request.headers)
     bodies = [request_of(_MANY, one.inputs).body for one in found]
     assert any(rb"\u0000" in body or b"\0" in body for body in bodies), "a NUL in a text"
-    halves = [body for body in bodies if rb"\ud83e" in body]
-    assert halves, "half a surrogate pair"
-    pair = halves[0].replace(rb"\ud83e", rb"\ud83e\udd16")
-    said = [json_fault(body, {})[0] for body in (halves[0], pair)]
+    half = json_text({"x": "\ud83e"}).encode()
+    said = [json_fault(body, {})[0] for body in (half, half.replace(rb"\ud83e", rb"\ud83e\udd16"))]
     assert said == ["unclear", "valid"]
 
 
