@@ -17,7 +17,7 @@ from urllib.parse import quote, unquote, urlsplit
 
 from conformance.api.call_rules import words_of
 from conformance.api.rest.listing import items_of
-from conformance.api.rest.references import collections_of, singular
+from conformance.api.rest.references import collections_of, refers, singular
 from conformance.api.rest.things import (
     SET,
     as_answered,
@@ -164,6 +164,7 @@ class Memory:
         # Paths of things that lack it though it was sent, by template and member.
         self._lacking: dict[tuple[str, str], set[str]] = defaultdict(set)
         self._has: dict[str, set[str]] = defaultdict(set)  # members that some thing has
+        self._alive: set[str] = set()  # identifiers of things that were created or read, and not deleted since
         self._acts = 0
         # How long a value stayed the same, s: of things by template, of members by template and name.
         self._lasted: dict[tuple[str, str], dict[str, float]] = defaultdict(lambda: defaultdict(float))
@@ -176,6 +177,7 @@ class Memory:
         for thing in self._things.values():
             thing.written.clear()
         self._last.clear()
+        self._alive.clear()
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
@@ -240,6 +242,7 @@ class Memory:
         yield from self._judge_put(occasion, operation, before)
         thing = _Thing.of(path, occasion.exchange, made=status == HTTPStatus.CREATED)
         if occasion.request.method == "DELETE":
+            self._alive.clear()
             thing.gone, thing.own, thing.ends = True, path in self._made, ending_with(operation)
             thing.doubt, thing.is_gone_said = doubt_of_deletion(operation), says_gone(operation)
             yield from self._again(occasion, operation, before)
@@ -311,6 +314,7 @@ class Memory:
             body = _body_of(occasion, operation) or {}
             written = {name: (value, operation) for name, value in body.items()}
             self._made.add(target)
+            self._alive.add(target.rpartition("/")[2].casefold())
             thing = _Thing.of(target, occasion.exchange, made=True)
             thing.written, thing.body = written, hash(occasion.request.body)
             for one in self._things.values():
@@ -387,6 +391,7 @@ class Memory:
     def _read(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
         thing, response = self._things.get(path.casefold()), occasion.response
         if response.ok:
+            self._alive.add(path.rpartition("/")[2].casefold())
             yield from self._devices(occasion, item, path)
         if thing is None or thing.path != path:
             return
@@ -507,8 +512,15 @@ class Memory:
         """Judge whether members that two things were given are there, as the description of the read has them."""
         for name, (wanted, operation) in thing.written.items():
             part = parts_for(item.shape or {}, thing.written).get(name)
-            is_open = is_shared(name) or not (name in self._has[item.template] or says_exactly(part))
-            if part is None or wanted in _NOTHING or is_open or is_devices(name, part, self._collections):
+            has = self._has[item.template]
+            # A reference to what is there, which no thing ever has; null may stand for what is gone.
+            is_reference = part is not None and not {"readOnly", "writeOnly"} & flat(part).keys()
+            is_reference = is_reference and refers(name, part or {}, self._collections) and name in now
+            is_reference = is_reference and name not in has and str(wanted).casefold() in self._alive
+            is_open = is_shared(name) or not (name in has or says_exactly(part) or is_reference)
+            if part is None or wanted in _NOTHING or is_open:
+                continue
+            if is_devices(name, part, self._collections) and not is_reference:
                 continue
             lacking, is_there = self._lacking[item.template, name], now.get(name) is not None
             lacking |= set() if is_there or wanted == flat(part).get("default") else {thing.path}

@@ -12,6 +12,7 @@ _MEMBERS = {
     "id": {"type": "string"}, "name": {"type": "string"}, "rank": {"type": "integer"}, "state": {"type": "string"},
     "is_default": {"type": "boolean"}, "phase": {"enum": ["queued", "running", "done", "cancelled", "archived"]},
 }  # fmt: skip
+_MEMBERS["tag_id"] = {"type": ["string", "null"]}
 _MEMBERS["laps"] = {"type": "integer", "description": "How many; it never falls."}
 _OWN = {"built": {"type": "string", "readOnly": True}, "serial": {"type": "integer", "readOnly": True}}
 _JOB = {"type": "object", "properties": {**_MEMBERS, **_OWN, "kept": {"type": "boolean", "default": False}}}
@@ -179,9 +180,21 @@ _CANCELLED = _cancel(phase="cancelled")
 # Another thing whose name and rank read as written for ten seconds.
 _LASTING = [_put("8", rank=5, name="c"), 10.0, _get("8", rank=5, name="c")]
 _LABEL, _NO_LABEL = _below("PUT", 201), _below("DELETE", 204)
+
+
+def _tagged(id_, shown=None):
+    """Return the creation of a job with a reference to the tag, and the read of it."""
+    job = _job(id_, tag_id=shown)
+    return [
+        ("POST", "/jobs", {"name": "a", "rank": 1, "tag_id": "1"}, 201, job),
+        ("GET", f"/jobs/{id_}", None, 200, job),
+    ]
+
+
 #: What is sent, one second after each other or after so many, and the requirement that is broken.
 BROKEN = {
     "deleted, and read": ([_post("1"), _delete("1"), 5.0, _get("1")], GONE),
+    "references to a tag that is there are lost": ([_tag(), *_tagged("2"), *_tagged("3")], READ),
     "a label is deleted, and read": ([_LABEL, _NO_LABEL, 4.0, _below("GET")], GONE),
     "parts outlive their job": ([_delete("1"), _get("1", 404), 4.0, _parts()], GONE),
     "a rank falls": (
@@ -293,6 +306,8 @@ RIGHT = {
         *(_mode(name="a"), _set(422, name="roaas 1"), _set(name="roaas 1"), _mode(name="roaas 1")),
     ],
     "refused by a proxy that waited": [_mode(name="a"), _set(408, name="roaas 1"), _mode(name="roaas 1")],
+    "a reference to a tag that is gone": [_tag(), _NO_TAG, *_tagged("2"), *_tagged("3")],
+    "a reference that is lost once": [_tag(), *_tagged("2"), *_tagged("3", "1")],
     "a refused DELETE of what is not there": [_delete("1", 404), _get("1", 404)],
     "a job that runs": [_status("queued"), _cancel(act="retry", phase="running"), _status("running"), _status("done")],
     "a job that is cancelled later": [_status("running"), _CANCELLED, _status("running"), _status("cancelled")],
