@@ -485,7 +485,8 @@ def _is_time(value):
 
 
 _RULES = {
-    "name": lambda one: isinstance(one, str) and 1 <= len(one) <= 60,
+    # Half a surrogate pair is no text that CSV could show.
+    "name": lambda one: isinstance(one, str) and 1 <= len(one) <= 60 and one == one.encode(errors="ignore").decode(),
     "minutes": lambda one: type(one) in (int, float) and 0 <= one <= 600,
     "litres": lambda one: type(one) in (int, float) and one % 1 == 0 and 0 <= one <= 2**60,
     "starts": lambda one: isinstance(one, str) and _is_time(one),
