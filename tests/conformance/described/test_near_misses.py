@@ -65,3 +65,5 @@ def test_each_is_found_and_the_right_device_not_blamed(fault, requirement, tmp_p
     with small_device(described(_PATHS), routes) as url:
         done = certified(f"{url}/openapi.json", tmp_path / "out", "--call=*")
     assert requirement in done.blamed if fault else not done.blamed, done.text
+    # Frameworks do so, and a right device on one of them does not fail.
+    assert fault != "deep lists" or done.blamed == {requirement: "warn"}, done.text
