@@ -51,7 +51,7 @@ _RECORDS: Final = frozenset(
 )
 # An operationId often names what the operation does, as in `deleteMap`: such words count as the method's own.
 _OF_METHODS: Final = {method: frozenset(words) for method, words in {
-    "DELETE": ("delete", "deletes"), "PUT": ("update", "updates"), "PATCH": ("update", "updates")
+    "DELETE": ("delete", "deletes", "destroy", "destroys"), "PUT": ("update", "updates"), "PATCH": ("update", "updates")
 }.items()}  # fmt: skip
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _PARAMETER: Final = re.compile(r"\{[^{}]*\}")

@@ -48,6 +48,8 @@ _POWER = Operation("", "POST", "/power", bodies={"application/json": Body("", {"
         (Operation("updatePose", "PUT", "/pose"), CallRules(("*",)), Reason.ALLOWED),
         (Operation("", "POST", "/update"), CallRules(("*",)), Reason.HARMFUL),
         (Operation("a_delete", "DELETE", "/a"), CallRules(("/a",)), Reason.ALLOWED),
+        (Operation("lamps_destroy", "DELETE", "/lamps/{id}"), CallRules(("*",)), Reason.ALLOWED),
+        (Operation("lamps_destroy", "POST", "/lamps/{id}"), CallRules(("*",)), Reason.HARMFUL),
         (Operation("", "POST", "/delete/{id}"), CallRules(("*",)), Reason.HARMFUL),
         (Operation("UpdateJob", "POST", "/a/UpdateJob", created=True), CallRules(("*",)), Reason.ALLOWED),
         (Operation("UpdateFirmware", "POST", "/a/UpdateFirmware", created=True), CallRules(("*",)), Reason.HARMFUL),
