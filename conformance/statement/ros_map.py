@@ -241,6 +241,12 @@ KINDS: Final[dict[str, type[Operation]]] = {
 }  # fmt: skip
 
 
+def end_of(one: Operation) -> str:
+    """Return the full name of the topic, service, action or node that an operation reaches; empty for a list."""
+    keys = ("topic", "publishes", "service", "action", "node")
+    return next((str(getattr(one, key)) for key in keys if hasattr(one, key)), "")
+
+
 def followers(one: Operation) -> tuple[str, ...]:
     """Return the operations that read the state of a goal or call, and cancel it."""
     state = one.state.read if isinstance(one, Acts | Calls) and one.state else ""

@@ -13,8 +13,10 @@ from conformance.scenarios.ros.presence import (
     Listed,
     Presence,
     Publishers,
+    Strangers,
     graph_grows,
     graph_lists,
+    lists_beside_graph,
     many_reads,
     publishers_end,
     publishers_of_each_quality,
@@ -26,6 +28,8 @@ from conformance.scenarios.ros.web import is_success
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.verdict.evidence import Case
 
+# Names that a finding shows.
+_NAMES: Final = 5
 _ALL: Final = "all topics at once"
 
 
@@ -114,6 +118,14 @@ def lists_grow(trace: Grown) -> Iterator[Outcome]:
         yield Case(
             not wrong, exchange, f"none of {trace.count} topics that have gone", f"{wrong} of them", "keeps many"
         )
+
+
+@rule("ros-gateway/lists", on=(lists_beside_graph,))
+def lists_nothing_else(trace: tuple[Strangers, ...]) -> Iterator[Outcome]:
+    """Judge whether every name in a list is on the graph."""
+    for listed in trace:
+        expected = "only names that are on the graph"
+        yield Case(not listed.names, listed.exchange, expected, ", ".join(listed.names[:_NAMES]), "not on the graph")
 
 
 @rule("ros-gateway/recovers", on=(graph_grows,))

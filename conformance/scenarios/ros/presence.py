@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import secrets
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from typing import Any, Final
@@ -20,7 +20,7 @@ from conformance.scenarios.ros.services import NO_PLAY
 from conformance.scenarios.ros.web import content_of, differences, document_of, is_success
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
-from conformance.statement.ros_map import Lists, Publishes, Reads
+from conformance.statement.ros_map import Lists, Publishes, Reads, end_of
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 
@@ -292,6 +292,49 @@ def graph_lists(gateway: Gateway) -> tuple[Listed, ...]:
             gateway.robot.tell("forget", name=name)
         found += [_read_list(gateway, call, body, name, kind, there=False) for name in names]
     return tuple(found)
+
+
+@dataclass(frozen=True)
+class Strangers:
+    """What a list has beside the graph.
+
+    Attributes:
+        names: the names that are not on the graph.
+        exchange: the last read of the list.
+    """
+
+    names: tuple[str, ...]
+    exchange: Exchange
+
+
+@scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.SETTLING)
+def lists_beside_graph(gateway: Gateway) -> tuple[Strangers, ...]:
+    """Read each list until the graph has all of its names; names of the suite may stay longer, as it is killed."""
+    if not gateway.plays:
+        raise NotDeclaredError(NO_PLAY)
+    # What the suite had as the robot may be on the gateway's graph for a while after the suite's process was killed.
+    own = ("/roaas_", *(f"{name}/" for name in map(end_of, gateway.ros.operations.values()) if name))
+    found = []
+    for call, body in gateway.of(Lists):
+        until = WALL_CLOCK.now() + body.timeout_s + PATIENCE_S
+        there: set[str] = set()
+        while True:
+            exchange = gateway.send(gateway.binding.make(call, None), body.timeout_s + PATIENCE_S)
+            there |= gateway.robot.names(body.lists)
+            listed = _types_in(exchange, body)
+            names = [name for name in strangers(listed, there) if not f"{name}/".startswith(own)]
+            if not names or WALL_CLOCK.now() > until:
+                break
+            WALL_CLOCK.sleep(PACE_S)
+        if listed:
+            found.append(Strangers(tuple(names), exchange))
+    return tuple(found)
+
+
+def strangers(listed: Iterable[str], there: Container[str]) -> list[str]:
+    """Return the listed names, which may lack their first slash, that the graph does not have."""
+    full = {f"/{name.lstrip('/')}" for name in listed}
+    return sorted(name for name in full if name not in there)
 
 
 @dataclass(frozen=True)

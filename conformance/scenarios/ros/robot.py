@@ -93,6 +93,10 @@ class Robot(RosProcess):
         events = self.tell("heard", name=name, count=count, within_s=within_s)["events"]
         return [Heard(at / _NS, what, json.dumps(value)) for at, what, value in events]
 
+    def names(self, what: str) -> set[str]:
+        """Return the names on the graph of "topics", "services", "actions" or "nodes"."""
+        return set(self.tell("graph")[what])
+
     def count(self, topic: str, ends: str) -> int:
         """Return how many "publishers" or "subscribers" a topic has on the graph."""
         return int(self.tell("graph")["topics"].get(topic, {}).get(ends, 0))

@@ -43,6 +43,7 @@ FAULTS = {
         "messages mixed": "own-topic",
         "last response": "service-response",
         "goal doubled": "goal-once",
+        "list has what never was": "lists",
         "canceled when its client leaves": "goal-cancel",
         "result lost": "goal-result",
         "stream drops": "stream-once",
@@ -72,7 +73,7 @@ FAULTS = {
 ENDS = {
     ("fastapi", "quick"): "/odom /scan /counts /say /offsets /cmd_vel /enable /navigate max_speed topics",
     ("flask", "quick"): "/odom /cmd_vel /enable /navigate modes",
-    ("aiohttp", "quick"): "/scan /status /note /say /route /navigate",
+    ("aiohttp", "quick"): "/scan /status /note /say /route /navigate topics",
     ("rosbridge", "quick"): "/odom /cmd_vel /enable /navigate",
     ("flask", "standard"): "/odom /note /say /cmd_vel /enable topics",
 }

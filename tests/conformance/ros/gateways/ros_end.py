@@ -348,6 +348,8 @@ class RosEnd:
             return {"/" + name.rpartition("/")[2]: kind for name, kind in there.items()}
         if "list cut" in self.faults:
             return dict(list(there.items())[-25:])
+        if "list has what never was" in self.faults:
+            return {**there, "/ghost": "std_msgs/msg/String"}
         if "list keeps what is gone" in self.faults:
             self._topics |= there
             return self._topics

@@ -11,6 +11,7 @@ from conformance.packs.table1.robot.probe import Probe, ProbeError, RosProbe
 from conformance.packs.table1.robot.robot import SENSORS, Robot
 from conformance.packs.table1.scenarios.interfaces_in_motion import OnRos, velocities_on_ros
 from conformance.packs.table1.statement import said_of
+from conformance.scenarios.ros.presence import strangers
 from conformance.scenarios.rule import Outcome, rule
 from conformance.verdict.evidence import Case, Judge
 from conformance.verdict.run import Run
@@ -41,25 +42,25 @@ def test_sensors_are_on_the_graph(robot: Robot, seeing: Probe, judge: Judge) -> 
     entries, exchange = robot.read(SENSORS, SENSORS_SHAPE)
     if entries is None:
         pytest.skip("the robot's list of sensors cannot be read")
-    listed = {("/" + entry["topic"].lstrip("/"), entry["type"]) for entry in entries}
-    there: set[tuple[str, str]] = set()
+    listed = {f"{entry['topic']} {entry['type']}" for entry in entries}
+    there: set[str] = set()
     for _ in poll_for(robot.clock, 0.05, _DISCOVERED_S):
-        if listed <= there:
+        if not strangers(listed, there):
             break
         try:
             topics = seeing.topics()
         except ProbeError as error:
             pytest.skip(str(error))
-        there = {(name, type_) for name, types in topics.items() for type_ in types}
-    kinds = {type_ for _, type_ in listed}
-    unlisted = {pair for pair in there if pair[1] in _SENSOR_TYPES - kinds}
-    for missing, found in ((listed - there, "not on the graph"), (unlisted, "not in the list")):
+        there = {f"{name} {type_}" for name, types in topics.items() for type_ in types}
+    others = _SENSOR_TYPES - {entry["type"] for entry in entries}
+    unlisted = sorted(one for one in there if one.split()[1] in others)
+    for missing, found in ((strangers(listed, there), "not on the graph"), (unlisted, "not in the list")):
         judge.check(
             "equivalence/sensors-graph",
             not missing,
             exchange,
             "the sensors that are published on the ROS graph",
-            found=f"{found}: {', '.join(' '.join(pair) for pair in sorted(missing))}",
+            found=f"{found}: {', '.join(missing)}",
             cause=found,
         )
 
