@@ -39,7 +39,7 @@ _FEWEST: Final = 3  # fewest reads with a slow device, and by several clients
 _AT_ONCE: Final = 325
 # First requests, which measure the device's response time even if it has no reads.
 _FIRST: Final = 12
-_ON_THINGS = 250  # requests to the device's collections and objects, if it allows changes
+_ON_THINGS = 350  # requests to the device's collections and objects, if it allows changes
 _EACH_ON_THINGS = 25  # the same for each operation
 _WAITS_S: Final = 6.0  # how long the run then waits for late changes, s
 _OWN_MS: Final = 0.5  # the suite's own time for a request, ms

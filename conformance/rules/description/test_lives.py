@@ -17,6 +17,7 @@ from conformance.scenarios.ending import Deletion, Ended, begin_and_end, look_at
 from conformance.scenarios.keys import REFUSED_BODY, Keyed, repeated_keys
 from conformance.scenarios.lifecycles import lifecycles
 from conformance.scenarios.living import Kind, Life
+from conformance.scenarios.read_effects import read_effects
 from conformance.scenarios.rule import Outcome, rule
 from conformance.scenarios.safe_reads import Watched, safe_reads
 from conformance.scenarios.tables import Table, tables
@@ -128,7 +129,7 @@ def idempotency_key(trace: tuple[Keyed, ...]) -> Iterable[Outcome]:
         )
 
 
-@rule("description/safe", on=(safe_reads,))
+@rule("description/safe", on=(safe_reads, read_effects))
 def safe(trace: tuple[Watched, ...]) -> Iterable[Outcome]:
     """Judge whether safe requests leave values unchanged that clients write."""
     for watch in (one for one in trace if one.is_safe):
