@@ -51,7 +51,7 @@ def special_bodies(
         return
     if owned := with_owned(change, read, {} if change.method == "PATCH" else usual.body):
         yield owned
-    parts = parts_of(schema)
+    parts = _sent_parts(schema)
     there = {name: one for name, one in first.items() if name in parts and not parts[name].get("readOnly")}
     there = {name: one for name, one in there.items() if fits(parts[name], one)}
     changed = {name: one for name, one in telling(schema, there, 1, values.collections).items() if may(name)}
@@ -91,6 +91,12 @@ def special_bodies(
         yield restored
 
 
+def _sent_parts(schema: Schema) -> dict[str, Any]:
+    """Return the members of a body as it is sent: an object around all others is one of them."""
+    parts: dict[str, Any] = flat(schema).get("properties", {})
+    return parts
+
+
 def _rich(parts: dict[str, Any], there: dict[str, Any], collections: frozenset[str]) -> dict[str, Any]:
     """Return new entries for each map, and two different items for each list of objects."""
     found: dict[str, Any] = {}
@@ -123,7 +129,7 @@ def _in_lines(changed: dict[str, Any], parts: dict[str, Any]) -> list[dict[str, 
     # A text that is kept exactly has blanks at its ends too.
     lines = [{name: f" {_LINES} " if says_exactly(parts[name]) else _LINES} for name in (longer or texts)[-1:]]
     within = (
-        (name, one, _in_lines(one, parts_of(parts[name]))) for name, one in changed.items() if isinstance(one, dict)
+        (name, one, _in_lines(one, _sent_parts(parts[name]))) for name, one in changed.items() if isinstance(one, dict)
     )
     return lines + [{name: {**one, **text}} for name, one, inner in within for text in inner][:1]
 
@@ -152,7 +158,7 @@ def _replacing(
 ) -> Iterator[dict[str, Any]]:
     """Yield bodies of PUT with other values of all members, with the required members alone, and as it was before."""
     if fits(schema, {**base, **changed}):
-        parts = parts_of(schema)
+        parts = _sent_parts(schema)
         whole = {**base, **changed}
         rich = {**whole, **_rich(parts, whole, values.collections)}
         lines = [{**whole, **one} for one in _in_lines(changed, parts)]
@@ -161,7 +167,7 @@ def _replacing(
         least = {name: base[name] for name in base if name in flat(schema).get("required", ())}
         other = telling(schema, least, 2, values.collections)
         least |= {name: one for name, one in other.items() if may(name)}
-        left_out = [flat(one) for name, one in parts_of(schema).items() if name not in least]
+        left_out = [flat(one) for name, one in parts.items() if name not in least]
         goes = needed is not None and any(name not in least and name not in needed for name in base)
         if (goes or any("default" in item for item in left_out)) and fits(schema, least):
             yield least
@@ -183,7 +189,7 @@ def half_valid(change: Operation, usual: Inputs, valid: dict[str, Any]) -> Itera
 
 def telling(schema: Schema, body: dict[str, Any], turn: int, collections: frozenset[str]) -> dict[str, Any]:
     """Return other values for a body's members by which losses show: fractions, order, time zones."""
-    parts, found = parts_of(schema), another(schema, body, turn, collections)
+    parts, found = _sent_parts(schema), another(schema, body, turn, collections)
     for name in found:
         given = flat(parts.get(name, {}))
         if is_devices(name, given, collections):

@@ -1,4 +1,4 @@
-"""Merge patches that the suite sends, and what each of them shows."""
+"""Bodies that the suite sends to write, and what each of them shows."""
 
 from small_device import answers, body_of, described, object_of
 
@@ -45,3 +45,16 @@ def test_null_is_written_where_every_response_may_have_it(tmp_path):
     read, change = sorted(operations_of(contract), key=lambda operation: operation.method)
     bodies = special_bodies(change, read, lambda: {"name": "north", "note": "a"}, Values(), lambda _: True)
     assert [one for one in bodies if None in one.values()] == [{"note": None}]
+
+
+def test_a_body_with_one_object_around_its_values_is_sent_with_other_values_in_it(tmp_path):
+    taken = object_of(values=object_of(name={"type": "string"}, level={"type": "integer"}))
+    shown = object_of(id={"type": "string"}, values=taken["properties"]["values"])
+    body, responses = body_of(taken), {"200": answers(shown)}
+    paths = {"/settings": {"get": {"responses": responses}, "put": {"requestBody": body, "responses": responses}}}
+    contract = Contract.load(write_described_pack(tmp_path, document := described(paths, "3.1.0"), document))
+    read, change = sorted(operations_of(contract), key=lambda operation: operation.method)
+    now = {"values": {"name": "north", "level": 40}}
+    bodies = [one for one in special_bodies(change, read, lambda: now, Values(), lambda _: True) if fits(taken, one)]
+    assert bodies[-1] == now
+    assert {"north", 40}.isdisjoint(bodies[0]["values"].values())
