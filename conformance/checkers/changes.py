@@ -15,7 +15,7 @@ from urllib.parse import unquote
 
 from conformance.api.call_rules import words_of
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import collection_of
+from conformance.api.rest.things import collection_of, doubt_of_life
 from conformance.checkers.occasion import ABSENT, MOST_OCTETS, SETTLES_S, Occasion
 from conformance.checkers.untouched import KEEPS
 from conformance.contract.pack import Contract
@@ -30,6 +30,8 @@ _MOST_THINGS: Final = 1_000
 #: How often a change of state must follow an operation, because once may be by chance.
 TWICE: Final = 2
 _KEPT: Final = "description/refused-keeps"
+# How the refusal of a client without valid credentials is noted.
+_STRANGER: Final = ("with status 401", "with status 403")
 # Phrases in a description: for the state to which an operation leads, and for the conditions on which it is refused.
 _LEADS: Final = re.compile(
     r"\b(?:is|are) (?:then|now|afterwards) `?([\w-]+)|\b(?:becomes?|goes (?:in)?to|turns) `?([\w-]+)", re.IGNORECASE
@@ -148,6 +150,9 @@ class Changes:
         self._ending: set[str] = set()
         # The state that a thing had at the end, where the description calls that final, by path.
         self._ended: dict[str, str] = {}
+        # By the operation that reads them: things that were gone after a client without valid credentials wanted to
+        # delete one, and whether one stayed.
+        self._gone, self._staying = Counter[str](), set[str]()
 
     def forget(self) -> None:
         """Forget all states that a request of unknown effect may have changed."""
@@ -229,11 +234,17 @@ class Changes:
         status = occasion.response.status
         refused = self._there.pop(path, "")
         if status in ABSENT and refused:
-            expected, doubt = f"what was there before {refused}", "the thing may have ended by itself"
+            # Things end by themselves, but not each time that a client without credentials wants to delete one.
+            self._gone[operation.label] += refused.endswith(_STRANGER)
+            is_sure = self._gone[operation.label] >= TWICE and operation.label not in self._staying
+            is_sure = is_sure and not doubt_of_life(operation)
+            expected = f"what was there before {refused}"
+            doubt = "" if is_sure else "the thing may have ended by itself"
             yield occasion.case(_KEPT, False, expected, cause=operation.label, doubt=doubt)  # noqa: FBT003 - see case()
         if not occasion.response.ok:
             return
         if refused:
+            self._staying |= {operation.label} if refused.endswith(_STRANGER) else set()
             expected = f"what was there before {refused}"
             yield occasion.case(_KEPT, True, expected, cause=operation.label)  # noqa: FBT003 - see case()
         if len(self._there) < _MOST_THINGS:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, suppress
+from dataclasses import replace
 from typing import Final
 from urllib.parse import quote
 
@@ -14,6 +15,7 @@ from conformance.api.rest.values import Values
 from conformance.documents.openapi import Operation, operations_of
 from conformance.documents.security import demands
 from conformance.scenarios.creating import created_path
+from conformance.scenarios.reaching import WANTS_CONDITION
 from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Surveyor
@@ -46,8 +48,8 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
     with ExitStack() as stack:
         unknown, *nearly = (stack.enter_context(closing(Stranger(api, wrong))) for wrong in (own.wrong, *own.nearly))
         for number, operation in enumerate(closed):
-            # Nearly right credentials are used in rotation.
-            near = nearly[number % len(nearly) :][:1] if nearly else []
+            # Nearly right credentials are used in rotation, all of them at least once.
+            near = nearly[number % len(nearly) :: len(closed)] if nearly else []
             tried: list[tuple[HttpClient | Stranger, bool]] = [(api.client, False)]
             tried += [(stranger, True) for stranger in ([unknown, *near] if own else [])]
             if operation.label in api.streams:
@@ -55,14 +57,15 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
             request = request_of(operation, usual_inputs(operation, values)[0])
             for client, authorized in tried:
                 with suppress(NoAnswerError):  # the survey reports a missing response
-                    exchange = client.send(
-                        request.method,
-                        request.target,
-                        headers=request.headers,
-                        body=request.body,
-                        authorized=authorized,
-                        fresh=True,
-                    )
+                    exchange = _send(client, request, authorized=authorized)
+                    if exchange and exchange.response.status in WANTS_CONDITION:
+                        # The condition was looked at before the credentials, or these were not looked at.
+                        tag = api.client.send("GET", request.target).response.header("etag") or "*"
+                        exchange = _send(
+                            client,
+                            replace(request, headers=(*request.headers, ("If-Match", tag))),
+                            authorized=authorized,
+                        )
                     found += [exchange] if exchange else []
                     if exchange and operation.method == "GET" and not authorized and not exchange.response.ok:
                         found.append(api.client.send("HEAD", request.target, authorized=False, fresh=True))
@@ -74,6 +77,12 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
         with suppress(NoAnswerError):
             api.client.send("GET", next(filter(None, absent), f"/{_ABSENT}"))
     return (*found, *_on_kept_connection(api, values, closed), *_beyond_ascii(api, values, closed))
+
+
+def _send(client: HttpClient | Stranger, request: Outgoing, *, authorized: bool) -> Exchange | None:
+    return client.send(
+        request.method, request.target, headers=request.headers, body=request.body, authorized=authorized, fresh=True
+    )
 
 
 def _on_kept_connection(api: RestInterface, values: Values, closed: list[Operation]) -> Iterator[Exchange]:
@@ -109,9 +118,7 @@ def _on_new_thing(
         target = path + operation.template[len(item) :] + "".join(request.target.partition("?")[1:])
         if operation.safe and put is not None:
             Writer(api, surveyor.values).send(put, target)
-        sent = client.send(
-            request.method, target, headers=request.headers, body=request.body, authorized=authorized, fresh=True
-        )
+        sent = _send(client, replace(request, target=target), authorized=authorized)
         yield from [sent] if sent else []
         if delete is not None:
             Writer(api, surveyor.values).send(delete, path)

@@ -17,7 +17,7 @@ from conformance.scenarios.ending import Deletion, Ended, begin_and_end, look_at
 from conformance.scenarios.keys import REFUSED_BODY, Keyed, repeated_keys
 from conformance.scenarios.lifecycles import lifecycles
 from conformance.scenarios.living import Kind, Life
-from conformance.scenarios.read_effects import read_effects
+from conformance.scenarios.no_effects import no_effects
 from conformance.scenarios.rule import Outcome, rule
 from conformance.scenarios.safe_reads import Watched, safe_reads
 from conformance.scenarios.tables import Table, tables
@@ -129,11 +129,18 @@ def idempotency_key(trace: tuple[Keyed, ...]) -> Iterable[Outcome]:
         )
 
 
-@rule("description/safe", on=(safe_reads, read_effects))
+@rule("description/safe", on=(safe_reads, no_effects))
 def safe(trace: tuple[Watched, ...]) -> Iterable[Outcome]:
     """Judge whether safe requests leave values unchanged that clients write."""
     for watch in (one for one in trace if one.is_safe):
         yield Case(not watch.fault, watch.shown, watch.expected, watch.fault, cause=watch.operation)
+
+
+@rule("description/refused-keeps", on=(no_effects,))
+def refused_without_effect(trace: tuple[Watched, ...]) -> Iterable[Outcome]:
+    """Judge whether requests that are refused for their credentials change nothing."""
+    for watch in (one for one in trace if not one.is_safe):
+        yield Case(False, watch.shown, watch.expected, watch.fault, cause=watch.operation)
 
 
 @rule("description/written-is-read", on=(safe_reads,))

@@ -45,14 +45,18 @@ def test_what_requires_credentials_is_sent_without_them_and_with_wrong_ones(tmp_
         client = HttpClient(url, Connection(token="roaas"))  # noqa: S106 - no secret
         trace = anonymous_requests.play(RestInterface(run, client), Values())
         client.close()
-    # After wrong credentials come right ones, so that the device does not count the wrong ones.
-    methods_of = {"GET": ["GET", "HEAD", "GET", "GET", "GET", "GET"], "POST": ["POST", "POST", "GET", "POST", "GET"]}
-    expected = [(one, "/closed") for method in methods for one in methods_of[method]]
-    assert seen == [*expected, ("GET", "/roaas-is-not-there")]
-    sent = [dict(one.request.headers).get("Authorization") for one in trace]
-    near = ("Bearer $ROAAS_TOKEN-roaas-not-this-one", "Bearer $ROAAS_TOKEN_SHORTENED")
-    assert sent == [None, *(one for tail in near[: len(methods)] for one in (None, "Bearer roaas-not-this-one", tail))]
-    assert "$ROAAS_TOKEN" not in sent
+    near = [
+        "Bearer $ROAAS_TOKEN-roaas-not-this-one", *(f"Bearer $ROAAS_TOKEN_{how}" for how in ("SHORTENED", "ALTERED")),
+        "Bearer $ROAAS_TOKEN_RECASED", "Bearer $ROAAS_TOKEN_EMPTIED", "Token $ROAAS_TOKEN",
+    ]  # fmt: skip
+    expected, headers = [], [None]
+    for number, method in enumerate(methods):
+        own = near[number :: len(methods)]  # each kind at least once, and several kinds for each of few operations
+        # After wrong credentials come right ones, so that the device does not count the wrong ones.
+        expected += [method, *["HEAD"] * (method == "GET"), *[method, "GET"] * (1 + len(own))]
+        headers += [None, "Bearer roaas-not-this-one", *own]
+    assert seen == [*((one, "/closed") for one in expected), ("GET", "/roaas-is-not-there")]
+    assert [dict(one.request.headers).get("Authorization") for one in trace] == headers
 
 
 _ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "integer"}}

@@ -1,9 +1,10 @@
-"""Find values that reading changes and no client writes, such as a lamp that the GET of a zone switches.
+"""Find values that a request changes although it must not: a safe one, or one that is refused for its credentials.
 
-In one arm of the experiment the suite waits and then reads a value, in the other it sends a safe request before that
-read. Both arms may begin with a request that acts, so that an effect that lasts shows again. A request has an effect if
-the value is the same whenever it is not sent, and another one each time that it is. What counts or dates requests does
-not count, nor does what every safe request changes: a device may keep records of them (RFC 9110 9.2.1).
+Such a value is a lamp that the GET of something else switches. In one arm of the experiment the suite waits and then
+reads a value, in the other it sends the request before that read. Both arms may begin with a request that acts, so that
+an effect that lasts shows again. A request has an effect if the value is the same whenever it is not sent, and another
+one each time that it is. What counts or dates requests does not count, nor does what every request changes: a device
+may keep records of them (RFC 9110 9.2.1).
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from conformance.api.rest.variations import unknown_variations
 from conformance.checkers.changes import ENDING
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import Operation, is_json
+from conformance.documents.security import demands
 from conformance.scenarios.creating import created_path
 from conformance.scenarios.living import ABSENT
 from conformance.scenarios.safe_reads import Watched
@@ -71,13 +73,23 @@ _SAYS: Final = re.compile(
     r"\b(?:acknowledg|clear|consum|de-?queue|drain|empt(?:y|ies)|flush|mark|once|pop|refresh|remov|reset|since the)",
     re.IGNORECASE,
 )
+_REFUSED: Final = frozenset({401, 403})
 _THERE: Final = ""  # the place whose value is whether the resource exists
 _Places = dict[str, Any]
 
 
 @dataclass(frozen=True)
+class _Try:
+    """A request that must change nothing; one that is not authorized has no credentials, and must be refused."""
+
+    operation: Operation
+    request: Outgoing
+    authorized: bool = True
+
+
+@dataclass(frozen=True)
 class _Suspect:
-    """A value that has changed while nothing but safe requests was sent.
+    """A value that has changed while nothing was sent but requests that must change nothing.
 
     Attributes:
         number: of its resource among those that are watched.
@@ -91,7 +103,7 @@ class _Suspect:
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
-def read_effects(api: RestInterface, values: Values) -> tuple[Watched, ...]:
+def no_effects(api: RestInterface, values: Values) -> tuple[Watched, ...]:
     """Read all resources in several orders, after requests that act too, and try safe requests one by one."""
     experiment = _Experiment(Writer(api, values))
     api.run.limit.check()
@@ -194,17 +206,23 @@ class _Experiment:
         exchange = self._send(self._watched[number][1])
         return _values(exchange), exchange
 
-    def _safe(self) -> Iterator[tuple[Operation, Outgoing]]:
-        """Yield safe requests: each GET, each GET of a thing that does not exist, HEAD and OPTIONS."""
+    def _tries(self) -> Iterator[_Try]:
+        """Yield each GET, each GET of a thing that does not exist, HEAD and OPTIONS, and writes without credentials."""
         reads = [one for (method, _), one in self._operations.items() if method == "GET"]
         for read in reads:
-            yield read, self._request(read)
+            yield _Try(read, self._request(read))
             usual = usual_inputs(read, self.writer.values)[0]
             for unknown in islice(unknown_variations(read, usual), 1):
-                yield read, request_of(read, unknown.inputs)
+                yield _Try(read, request_of(read, unknown.inputs))
         for read in reads:
             for method in ("HEAD", "OPTIONS"):
-                yield read, replace(self._request(read), method=method)
+                yield _Try(read, replace(self._request(read), method=method))
+        description = self.writer.api.run.contract.openapi
+        for operation in self._operations.values():
+            template, is_closed = operation.template.rstrip("/"), demands(description, operation)
+            own = any(f"{template}/".startswith(f"{one}/") for one in self._made)
+            if is_closed and not operation.safe and is_free(operation, template) and (own or "{" not in template):
+                yield _Try(operation, self._request(operation), authorized=False)
 
     def _suspects(self, act: Outgoing | None, *, in_full: bool) -> Iterator[_Suspect]:
         """Yield what differs between reads that no request but safe ones separates; the order of the reads varies.
@@ -221,15 +239,25 @@ class _Experiment:
             self._perform(act)
         back = {number: self._read(number)[0] for number in reversed(numbers)}
         known = {request for _, request in self._watched}
-        for _, request in self._safe():
-            if (in_full or request.method == "GET") and request not in known:
-                with suppress(NotPermittedError):
-                    self._send(request)
+        for one in self._tries():
+            if (in_full or one.request.method == "GET") and one.request not in known:
+                self._attempt(one)
         for number in numbers:
             first, second = pairs[number]
             third, last = back[number], self._read(number)[0]
             for before, after in ((first, second), (third, last), (first, third), (second, last)):
-                yield from (_Suspect(number, place, act) for place in _changes(before, after))
+                yield from (_Suspect(number, place, act) for place in _changes(before, after, grown=in_full))
+
+    def _attempt(self, one: _Try) -> Exchange | None:
+        """Send a request that must change nothing; return None if it could not be sent, or was not refused."""
+        request = one.request
+        with suppress(NotPermittedError):
+            if one.authorized:
+                return self._send(request)
+            options: dict[str, Any] = {"headers": request.headers, "body": request.body, "authorized": False}
+            sent = self.writer.api.client.send(request.method, request.target, fresh=True, **options)
+            return sent if sent.response.status in _REFUSED else None
+        return None
 
     def _perform(self, act: Outgoing | None) -> bool:
         with suppress(NotPermittedError):
@@ -245,49 +273,47 @@ class _Experiment:
         if any(value != seen[0] for value in seen[1:]):
             return None if one.act is not None else self._alternates(one)
         guilty, is_innocent = None, False
-        for operation, request in self._safe():
-            if not _SAYS.search(operation.text):
-                shown = self._effect(one, request, seen[0])
+        for tried in self._tries():
+            if not (tried.authorized and _SAYS.search(tried.operation.text)):
+                shown = self._effect(one, tried, seen[0])
                 is_innocent = is_innocent or shown is None
-                guilty = guilty or (shown and (request, *shown))
+                guilty = guilty or (shown and (tried, *shown))
             if guilty and is_innocent:
                 break
         if not guilty or not is_innocent:
             return None
-        request, exchange, value = guilty
+        tried, exchange, value = guilty
+        request = f"{tried.request.method} {tried.request.target}" + " without credentials" * (not tried.authorized)
         read = self._watched[one.number][0]
         act = f", sent after {one.act.method} {one.act.target}" if one.act is not None else ""
-        expected = (
-            f"{_place_name(one.place, read)} to stay {clip(seen[0])} after {request.method} {request.target}{act}"
-        )
+        expected = f"{_place_name(one.place, read)} to stay {clip(seen[0])} after {request}{act}"
         fault = f"{clip(value)}, {_ROUNDS} of {_ROUNDS} times, and never when it was not sent"
-        return Watched(read.label, exchange, expected, fault)
+        return Watched(read.label, exchange, expected, fault, is_safe=tried.authorized)
 
-    def _arm(self, one: _Suspect, request: Outgoing | None, wait_s: float) -> tuple[Any, Any, Exchange | None]:
-        """Act, wait, and send a safe request or none.
+    def _arm(self, one: _Suspect, tried: _Try | None, wait_s: float) -> tuple[Any, Any, Exchange | None]:
+        """Act, wait, and send a request that must change nothing, or none.
 
         Returns:
-            The value before that, if nothing acts; the value after it; and the exchange of the safe request.
+            The value before that, if nothing acts; the value after it; and the exchange of the request.
         """
         before = None if one.act is not None else self._read(one.number)[0].get(one.place)
         self._perform(one.act)
         time.sleep(wait_s)
-        sent = self._send(request) if request is not None else None
+        sent = self._attempt(tried) if tried is not None else None
         return before, self._read(one.number)[0].get(one.place), sent
 
-    def _effect(self, one: _Suspect, request: Outgoing, usual: Any) -> tuple[Exchange, Any] | None:
-        """Return a safe request's exchange and the value after it, if that changes each time, and never without it."""
+    def _effect(self, one: _Suspect, tried: _Try, usual: Any) -> tuple[Exchange, Any] | None:
+        """Return a request's exchange and the value after it, if that changes each time, and never without it."""
         sent, value = None, None
         for turn in range(_ROUNDS):
-            with suppress(NotPermittedError):
-                before, value, sent = self._arm(one, request, _WAITS_S[turn % 2])
-                if sent is None or not _counts(one.place, usual if one.act is not None else before, value):
-                    return None
-                # Without the request, the wait is as long as with it.
-                wait_s = _WAITS_S[turn % 2] + sent.response.elapsed_ms / 1000
-                before, alone, _ = self._arm(one, None, wait_s)
-                if alone != (usual if one.act is not None else before):
-                    return None
+            before, value, sent = self._arm(one, tried, _WAITS_S[turn % 2])
+            was = usual if one.act is not None else before
+            if sent is None or not _counts(one.place, was, value, grown=not tried.authorized):
+                return None
+            # Without the request, the wait is as long as with it.
+            before, alone, _ = self._arm(one, None, _WAITS_S[turn % 2] + sent.response.elapsed_ms / 1000)
+            if alone != (usual if one.act is not None else before):
+                return None
         return None if sent is None else (sent, value)
 
     def _alternates(self, one: _Suspect) -> Watched | None:
@@ -348,20 +374,20 @@ def _leaves(place: str, value: Any) -> Iterator[tuple[str, Any]]:
         yield (f"{place}/number of items", len(value)) if isinstance(value, list) else (place, value)
 
 
-def _changes(before: _Places, after: _Places) -> list[str]:
-    return [place for place, value in before.items() if place in after and _counts(place, value, after[place])]
+def _changes(before: _Places, after: _Places, *, grown: bool) -> list[str]:
+    return [place for place, old in before.items() if place in after and _counts(place, old, after[place], grown=grown)]
 
 
-def _counts(place: str, old: Any, new: Any) -> bool:
-    """Return whether a change is one that reading must not cause.
+def _counts(place: str, old: Any, new: Any, *, grown: bool = False) -> bool:
+    """Return whether a change is one that no request of this kind may cause.
 
-    Numbers that grow count something, and those with a fraction are measured.
+    Numbers that grow count something, unless ``grown``, and those with a fraction are measured.
     """
     if old == new or words_of(place.rpartition("/")[2]) & _RECORDS:
         return False
     kinds = {type(old), type(new)}
     if kinds == {int}:
-        return bool(new < old)
+        return grown or bool(new < old)
     if kinds <= {str, type(None)}:
         return not any(_DIGITS.match(value) for value in (old, new) if value)
     return kinds <= {bool, type(None)}
