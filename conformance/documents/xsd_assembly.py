@@ -249,16 +249,19 @@ def _only_imports(document: SchemaDocument) -> bool:
 
 def rpc_wrapper(name: str, space: str, parts: Sequence[tuple[str, str]]) -> SchemaDocument:
     """Return a schema with the wrapper of an rpc message (WSDL 1.1, 3.5): its parts by name and type."""
-    root = etree.Element(_SCHEMA, {"targetNamespace": space} if space else {}, nsmap={"xs": XSD})
-    for other in dict.fromkeys(namespace(type_) for _, type_ in parts):
-        if other not in {"", XSD, space}:
+    # Declared once: xmlschema does not read a prefix that another element declares again for another namespace.
+    spaces = dict.fromkeys(namespace(type_) for _, type_ in parts if namespace(type_) not in {"", XSD})
+    prefixes = {XSD: "xs", **{other: f"t{place}" for place, other in enumerate(spaces)}}
+    nsmap = {prefix: other for other, prefix in prefixes.items()}
+    root = etree.Element(_SCHEMA, {"targetNamespace": space} if space else {}, nsmap=nsmap)
+    for other in spaces:
+        if other != space:
             etree.SubElement(root, _IMPORT, namespace=other)
     whole = etree.SubElement(etree.SubElement(root, clark(XSD, "element"), name=name), clark(XSD, "complexType"))
     inside = etree.SubElement(whole, clark(XSD, "sequence"))
     for part, type_ in parts:
-        nsmap = {"t": namespace(type_)} if namespace(type_) else None
-        written = f"t:{local(type_)}" if nsmap else local(type_)
-        etree.SubElement(inside, clark(XSD, "element"), {"name": part, "type": written}, nsmap=nsmap)
+        written = f"{prefixes[namespace(type_)]}:{local(type_)}" if namespace(type_) else local(type_)
+        etree.SubElement(inside, clark(XSD, "element"), {"name": part, "type": written})
     return SchemaDocument(f"rpc:{name}", root, inline=True)
 
 

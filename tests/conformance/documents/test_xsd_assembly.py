@@ -496,3 +496,19 @@ def test_a_service_of_many_operations_is_read_in_linear_time() -> None:
 
     assert len(port.operations) == 1501
     assert time.process_time() - started < 5
+
+
+def test_the_parts_of_an_rpc_message_may_have_types_of_several_namespaces():
+    parts = ("xs:int", "x:D", "xs:string", "y:D")
+    parts = "".join(f'<w:part name="p{place}" type="{type_}"/>' for place, type_ in enumerate(parts))
+    rpc = _WSDL.replace('<w:part name="p" element="t:Get"/>', parts).replace('<w:part name="p" element="t:Got"/>', "")
+    rpc = rpc.replace("<s:binding ", '<s:binding style="rpc" ').replace('"literal"/>', '"literal" namespace="urn:t"/>')
+    found = read_services(
+        rpc.replace("TYPES", _schema("urn:x", _DEGREES) + _schema("urn:y", _DEGREES)).encode(),
+        "http://device/a/b.wsdl",
+        lambda _: b"",
+    )
+    assert found.faults == ()
+    spaces = '<Get xmlns="urn:t"><p0 xmlns="">1</p0><p1 xmlns="">9</p1><p2 xmlns="">a</p2><p3 xmlns="">{}</p3></Get>'
+    assert not found.types.invalid(etree.fromstring(spaces.format(9)))
+    assert found.types.invalid(etree.fromstring(spaces.format(10)))
