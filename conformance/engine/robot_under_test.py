@@ -442,6 +442,8 @@ class RobotUnderTest:
         # These requests judge nothing, and did not cause the robot's silence.
         silent = self.connection.unheard(recent=deque(), sent=0, is_away=self._is_of_gateway)
         clients = [(HttpClient(client.base_url, silent, Hangs()), path) for client, path in self._answering()]
+        for client, _ in self._answering():
+            client.close()  # a server that serves one connection at a time accepts another one only then
         try:
             while not (responds := any(self._answers(client, path) for client, path in clients)):
                 if time.monotonic() > until:

@@ -274,7 +274,11 @@ class Connections:
         self._idle: list[HttpConnection] = []
 
     def new(self) -> HttpConnection:
-        """Return a new connection that is not in the pool."""
+        """Return a new connection that is not in the pool, which gives up its own.
+
+        A server that serves one connection at a time, as Perl's HTTP::Daemon does, accepts it only then.
+        """
+        self.close()
         return HttpConnection(*self._server, self._number())
 
     def take(self) -> HttpConnection:

@@ -47,6 +47,7 @@ def send_together(rounds: Sequence[Sequence[Addressed]]) -> list[list[Attempt]]:
             for requests in rounds:
                 for to, request in requests:
                     to.connection.take_slot((request.method, to.url(request.target)))
+                    to.close()  # a server that serves few connections has more for these
                 start = threading.Barrier(len(requests))
                 try:
                     jobs = [

@@ -172,6 +172,7 @@ def _talk(
             Passage(request, number, 1, 1, sent_s, first_s, ended_s, within_s, response, problem, kind, whole)
         )
 
+    client.close()  # a server that serves one connection at a time accepts the new one only then
     try:
         left = max(_TO_CONNECT_S, deadline - time.monotonic())
         link = open_link(client.host, client.port, client.tls, left)
@@ -419,6 +420,7 @@ class PartialRequest:
         self.request = Request(method, client.url(path), (), b"", f"{shown}\r\n\r\n".encode()[: len(octets)] + body)
         client.connection.take_slot((method, self.request.url))
         self._connection, self._number, self._sent_s = client.connection, client.connection.number(), time.monotonic()
+        client.close()  # as in _talk()
         try:
             self._socket = socket.create_connection((client.host, client.port), client.connection.timeout_s)
             if client.scheme == "https":

@@ -11,6 +11,7 @@ from toy_server import Handler, server_of
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswer, NoAnswerError, Outgoing
 from conformance.transport.parallel import send_together
+from conformance.transport.raw import head, talk
 
 
 class _Handler(Handler):
@@ -60,6 +61,24 @@ def test_a_connection_that_the_server_has_ended_is_not_used_again(asking):
             assert server.ended.acquire(timeout=60)
     # None of them was sent on a closed connection and then once more.
     assert (server.opened, client.connection.sent) == (3, 6)
+
+
+def test_a_server_that_serves_one_connection_at_a_time_gets_the_next_one():
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+
+        def serve() -> None:
+            for _ in range(4):
+                link, _ = listening.accept()
+                with link:
+                    while link.recv(4096):
+                        link.sendall(b"HTTP/1.1 204 No Content\r\n\r\n")
+
+        threading.Thread(target=serve, daemon=True).start()
+        with closing(HttpClient(f"http://127.0.0.1:{listening.getsockname()[1]}", Connection(timeout_s=5))) as client:
+            client.send("GET", "/")
+            assert client.send("GET", "/", fresh=True).response.status == 204
+            client.send("GET", "/")
+            assert talk(client, head(client, "GET", "/"), answers=1).octets.startswith(b"HTTP/1.1 204")
 
 
 @pytest.mark.parametrize("closes", ["the client", "its request"])
