@@ -17,6 +17,7 @@ from conformance.api.rest.values import Values
 from conformance.contract.described import MOTION, ROS, SOAP, STATES
 from conformance.documents.openapi import Operation
 from conformance.scenarios.drawing import draw_requests
+from conformance.scenarios.pauses import PAUSES_S
 from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.soap_survey import requests_of
 from conformance.scenarios.stage import Leaves, Need, Stage
@@ -102,6 +103,7 @@ def estimate(run: Run, operations: Sequence[Operation]) -> Estimate:
         surveyed += max(FEWEST_REPEATS, effort.cases(REPEATS)) if reads else 0
         if len(reads) < len(operations):
             surveyed, waits_s = surveyed + _ON_THINGS + _EACH_ON_THINGS * len(operations), _WAITS_S
+        waits_s += sum(PAUSES_S[effort.name]) if reads else 0
         generated = [_generated_counts(operation, effort) for operation in operations]
         covering, fuzzed = sum(pair[0] for pair in generated), sum(pair[1] for pair in generated)
     http, at_once = _http(operations, effort) if "http" in run.claims else (0, 0)

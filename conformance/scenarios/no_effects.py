@@ -59,8 +59,8 @@ _ALTERNATING: Final = 8
 _OCTETS: Final = 65_536  # longest response that is compared, bytes
 # Digits of a text that may be a time, a count or an identifier.
 _DIGITS: Final = re.compile(r"(?:\D*\d){6}")
-# Words in names of values that tell of requests or of time.
-_RECORDS: Final = frozenset(
+#: Words in names of values that tell of requests or of time.
+RECORDS: Final = frozenset(
     {
         "access", "accessed", "age", "at", "client", "clients", "connected", "connection", "connections", "count",
         "cursor", "date", "etag", "expires", "hits", "last", "left", "limit", "new", "nonce", "opened", "quota", "read",
@@ -383,7 +383,7 @@ def _counts(place: str, old: Any, new: Any, *, grown: bool = False) -> bool:
 
     Numbers that grow count something, unless ``grown``, and those with a fraction are measured.
     """
-    if old == new or words_of(place.rpartition("/")[2]) & _RECORDS:
+    if old == new or words_of(place.rpartition("/")[2]) & RECORDS:
         return False
     kinds = {type(old), type(new)}
     if kinds == {int}:

@@ -14,6 +14,7 @@ from conformance.scenarios.generated import generated_requests
 from conformance.scenarios.neighbours import neighbours
 from conformance.scenarios.other_exchanges import others
 from conformance.scenarios.own_things import own_things
+from conformance.scenarios.pauses import AfterPause, first_reads_after_pauses
 from conformance.scenarios.rule import NotTested, Outcome, rule
 from conformance.scenarios.survey import TIMED, Probe, Survey, survey
 from conformance.transport.exchange import Exchange, NoAnswer
@@ -100,6 +101,14 @@ def recovers(trace: Survey) -> Iterable[Outcome]:
             return Fault("after", f"{came}, and status {before.status} before invalid requests")
 
         yield from told_once(after, "a response as before the invalid requests", fault, apart=True)
+
+
+@rule("robustness/recovers", on=(first_reads_after_pauses,))
+def answers_after_pauses(trace: tuple[AfterPause, ...]) -> Iterable[Outcome]:
+    """Judge whether the first read after a pause returns what the reads before and after it return."""
+    for one in trace:
+        expected = f"what was read before, though no request was sent for {one.pause_s:g} s"
+        yield Case(not one.fault, one.exchange, expected, one.fault, cause=f"{one.operation} pause")
 
 
 @rule("robustness/steady-latency", on=(survey, timed_again))
