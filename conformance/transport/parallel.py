@@ -10,7 +10,7 @@ from functools import partial
 from typing import Final, TypeVar
 
 from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import BUSY, Attempt, Exchange, NoAnswer, NoAnswerError, Outgoing
+from conformance.transport.exchange import BUSY, Attempt, Exchange, NoAnswer, NoAnswerError, Outgoing, Unanswered
 from conformance.transport.passage import Heard
 
 # More concurrent clients would be a load test, and exceed a small robot's sockets.
@@ -54,7 +54,7 @@ def send_together(rounds: Sequence[Sequence[Addressed]]) -> list[list[Attempt]]:
                         pool.submit(client.send, *addressed, start.wait)
                         for client, addressed in zip(clients, requests, strict=False)
                     ]
-                    attempts.append([job.result() for job in jobs])
+                    attempts.append([_among(job.result(), len(requests)) for job in jobs])
                 except BaseException:
                     # A signal came before all threads had begun: without this, the others would wait for ever.
                     start.abort()
@@ -142,6 +142,14 @@ class _Client:
         for shared, own in self._clients.values():
             own.close()
             shared.connection.resent += own.connection.resent
+
+
+def _among(attempt: Attempt, clients: int) -> Attempt:
+    """Return a result that says how many clients sent at the same moment, if that may be why no response came."""
+    if isinstance(attempt, Exchange) or attempt.kind is not NoAnswer.TIMEOUT or clients == 1:
+        return attempt
+    problem = f"{attempt.problem}, while {clients} clients had a connection each"
+    return Unanswered(attempt.request, problem, attempt.kind)
 
 
 def _tell(requests: Sequence[Addressed], attempts: Sequence[Attempt]) -> None:

@@ -105,8 +105,9 @@ def answered(trace: Trace) -> Iterator[Outcome]:
         if probe.unanswered is None:
             return ""
         # HTTP lets a server close the connection of a client that sends it no XML: gSOAP does.
-        closed = probe.unanswered.kind is NoAnswer.CLOSED
-        return None if closed and probe.kind in {Kind.UNREADABLE, Kind.EMPTY} else probe.unanswered.problem
+        kind = probe.unanswered.kind
+        closed = kind is NoAnswer.CLOSED and probe.kind in {Kind.UNREADABLE, Kind.EMPTY}
+        return None if closed or kind is NoAnswer.CIRCUIT_OPEN else probe.unanswered.problem
 
     return _cases(trace, "a response", wrong)
 

@@ -3,7 +3,11 @@
 import pytest
 from feeder import feeder
 from small_device import certified
-from soap_devices import camera, serving
+from soap_devices import SOAP_11, camera, serving
+
+from conformance.rules.soap.test_soap import answered
+from conformance.scenarios.soap_survey import Kind, SoapProbe
+from conformance.transport.exchange import NoAnswer, Request, Unanswered
 
 pytestmark = pytest.mark.side_by_side
 _STYLES = ("", "limits", "slow", "expires", "drifts")
@@ -116,3 +120,10 @@ def test_operations_whose_names_say_nothing_are_judged_as_before(tmp_path):
     for name in ("answered", "message", "response-valid", "recovers"):
         assert outcome.requirement(f"soap/{name}")["verdict"] == "pass"
     assert outcome.requirement("soap/written-is-read")["verdict"] not in {"pass", "fail", "warn"}
+
+
+@pytest.mark.parametrize(("kind", "cases"), [(NoAnswer.TIMEOUT, 1), (NoAnswer.CIRCUIT_OPEN, 0)])
+def test_a_message_that_was_not_sent_is_no_message_without_a_response(kind, cases):
+    unanswered = Unanswered(Request("POST", "http://camera/"), "no response", kind)
+    probe = SoapProbe("POST /camera/Get", Kind.USUAL, "a valid message", SOAP_11, None, unanswered=unanswered)
+    assert len(list(answered.judge((probe,)))) == cases

@@ -59,6 +59,12 @@ def test_a_robot_that_does_not_answer_is_an_error(client):
         send_together([[(client, Outgoing("GET", "/alone"))]])
 
 
+def test_a_timeout_says_how_many_clients_were_there(client):
+    client.connection.timeout_s = 0.2
+    with pytest.raises(NoAnswerError, match="while 2 clients had a connection each"):
+        send_together([[(client, Outgoing("GET", f"/{number}")) for number in range(2)]])
+
+
 class _Interrupted(list):
     """Requests of which a signal lets only the first be begun."""
 
