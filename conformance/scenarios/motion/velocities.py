@@ -255,14 +255,18 @@ class Part:
 
 
 def _in_a_row(mapped: MappedDevice, parts: Sequence[Part]) -> Iterator[Drive]:
-    """Drive at velocities one after the other, and end by velocity 0; repeat drives that a slow link spoilt."""
+    """Drive at velocities one after the other, and end by velocity 0; repeat what a slow link or machine spoilt."""
     left = list(parts)
     for _ in range(TRIES):
         again: list[Part] = []
         for part, drive, whole in _at_each(mapped, left):
             yield drive
             in_time = drive.end is None or not drive.end.was_late(drive.readings)
-            if not (whole and in_time and drive.was_kept(mapped.drives.hold_s)):
+            # A refused command is judged without readings.
+            shown = not drive.commands[-1].is_ok or _shows(
+                mapped, drive.wanted, drive.under_way, drive.settled_at(mapped.drives.settle_s)
+            )
+            if not (whole and in_time and shown and drive.was_kept(mapped.drives.hold_s)):
                 again.append(part)
         left = again
         if not left:
@@ -376,6 +380,12 @@ def left_alone(
         raise NotPossibleError(f"the limits leave no room for {part.what}")
 
 
+def _shows(mapped: MappedDevice, wanted: Position, readings: Sequence[Reading], begin: float) -> bool:
+    """Return whether the readings from a time on, s, are enough to measure each velocity."""
+    seen = [reading for reading in readings if reading.sent >= begin]
+    return all(speed_in(seen, name, mapped.motion) is not None for name in wanted)
+
+
 def _shows_hold(mapped: MappedDevice, drive: Drive, hold_s: float) -> bool:
     """Return whether readings within the hold time show velocities, or are too rare for that in every try."""
     last = drive.commands[-1]
@@ -467,8 +477,7 @@ def _kept_up(
 
     def unseen() -> bool:
         """Whether the readings are too few to measure what must have been reached, and there is room for more."""
-        seen = [reading for reading in readings if reading.sent >= begun + settle_s]
-        few = measured_s > 0 and any(speed_in(seen, name, motion) is None for name in wanted)
+        few = measured_s > 0 and not _shows(mapped, wanted, readings, begun + settle_s)
         return few and usual_s(readings) <= _KEPT_S and mapped.room.leads_on(made, readings, rests_s)
 
     while commands[-1].is_ok and ((now := mapped.clock.now()) < until or (now < until + _LONGER_S and unseen())):

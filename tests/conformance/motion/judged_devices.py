@@ -80,22 +80,40 @@ def _readings(value):
             yield from _readings(part)
 
 
-def passed_but(missing, judge):
-    """Check that a right device passes all but what its map does not declare; return the last run's command.
+def until(is_seen, run):
+    """Return what the first run found in which everything was seen, or the last of several.
 
-    A busy machine may keep a run from judging something, and never makes it fail: what was not judged is judged again.
+    A loaded machine may keep a run from seeing something, and never makes a right device fail.
     """
-    left = None
-    for _ in range(RUNS):
+    found = run()
+    for _ in range(RUNS - 1):
+        if is_seen(*found):
+            break
+        found = run()
+    return found
+
+
+def passed_but(missing, judge):
+    """Check that a right device passes all but what its map does not declare; return the last run's command."""
+    passed = set()
+
+    def run():
         done, judged = judge()
         assert judged, done.stdout + done.stderr
         assert not {"fail", "warn"} & set(judged.values()), done.stdout
-        not_passed = {id_.removeprefix("motion/") for id_, verdict in judged.items() if verdict != "pass"}
-        left = not_passed if left is None else left & not_passed
-        if left == missing:
-            break
+        passed.update(id_ for id_, verdict in judged.items() if verdict == "pass")
+        return done, {id_.removeprefix("motion/") for id_ in judged.keys() - passed}
+
+    done, left = until(lambda _, left: left == missing, run)
     assert left == missing, done.stdout
     return done
+
+
+def blamed_for(names, judge):
+    """Check that a wrong device fails the requirements with these names, and that it is told."""
+    ids = {f"motion/{name}" for name in names}
+    done, judged = until(lambda _, judged: all(judged[id_] == "fail" for id_ in ids), judge)
+    assert {id_: judged[id_] for id_ in ids} == dict.fromkeys(ids, "fail"), done.stdout
 
 
 def of_arm(arm, tmp_path, motion=QUICK, only=()):

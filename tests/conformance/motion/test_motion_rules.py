@@ -6,12 +6,15 @@ import tomllib
 import msgspec
 import mutants
 import pytest
+import rover
 from arm import MAP
 from careless import played as played_attempts
 from simulated import DEVICES, MUTANTS, RULES, cases_of, played
 
 from conformance.measures.samples import Noise
-from conformance.rules.motion import test_motion_attempts
+from conformance.rules.motion import test_motion_attempts, test_velocities
+from conformance.rules.motion.judging import tries_of
+from conformance.scenarios.motion import moves, velocities
 from conformance.scenarios.motion.resting import set_out
 from conformance.scenarios.motion.trace import Quiet, Reading, Resting, Tried
 from conformance.scenarios.scenario import Recording, Recordings
@@ -51,6 +54,25 @@ def test_a_right_device_breaks_no_rule(name, seed):
 @pytest.mark.parametrize("name", DEVICES)
 def test_a_right_device_that_is_far_away_breaks_no_rule(name, takes_s):
     assert _failed(name, noise=0.004, takes_s=lambda: takes_s)[0] == set()
+
+
+@pytest.mark.parametrize("requests", [80, 320])
+def test_a_velocity_that_a_machine_was_too_busy_to_measure_is_driven_again(requests):
+    """Without a hold time, nothing but the missing velocity shows that a drive was spoilt."""
+    left, outcomes = [0], []
+
+    def takes_s():
+        left[0] -= 1
+        return 0.15 if left[0] >= 0 else 0.002
+
+    toml = rover.MAP.replace(f"hold_s = {rover.HOLD_S}\n", "")
+    for scenario, trace, given in played("rover", toml=toml, takes_s=takes_s, effort="quick"):
+        left[0] = requests if scenario is moves.repeated else 0  # recorded just before the velocities
+        if scenario is velocities.velocities:
+            outcomes = [list(test_velocities.velocity.judge(tuple(one), given["motion"])) for one in tries_of(trace)]
+            assert max(len(one) for one in tries_of(trace)) in range(2, moves.TRIES + 1)
+    assert outcomes
+    assert all(isinstance(one, Case) and one.holds for found in outcomes for one in found), outcomes
 
 
 @pytest.mark.parametrize("name", DEVICES)
