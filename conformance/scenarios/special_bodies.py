@@ -162,6 +162,10 @@ def _replacing(
         whole = {**base, **changed}
         rich = {**whole, **_rich(parts, whole, values.collections)}
         lines = [{**whole, **one} for one in _in_lines(changed, parts)]
+        # One fraction that is lost does not show whether the device has steps.
+        parted = [name for name, one in whole.items() if isinstance(one, float) and not one.is_integer()]
+        second = telling(schema, whole, 2, values.collections) if parted else {}
+        lines += [{**whole, **{name: second[name] for name in parted if may(name)}}] if parted else []
         less = {**rich, **{name: one for name, one in _empty_values(parts, rich).items() if may(name)}}
         yield from (whole, *(one for one in (rich, less, *lines) if one != whole and fits(schema, one)))
         least = {name: base[name] for name in base if name in flat(schema).get("required", ())}

@@ -54,6 +54,10 @@ _TWICE: Final = "where an earlier thing is"  # in the expected text if a creatio
 _RESULT: Final = re.compile(r"(?:error|result|return|status)(?:code|no|number)|err(?:no|or)|success|errormessage")
 _FINE: Final = frozenset({"", "0", "true", "1", "ok", "success", "none", "no error", "noerror"})
 _JSON: Final = "application/json"
+# How a documentation says that a state forbids an operation, if the WSDL declares no fault for it.
+_ELSE: Final = re.compile(
+    r"(\bin (?:every|any|all) other states?[,:]? )an? (?:[\w.:-]+ )?fault(?=[.;]|$)", re.IGNORECASE
+)
 # Elements that are nested deeper than this are not named.
 _DEEPEST: Final = 6
 # Words around the name of the things of a list.
@@ -495,10 +499,12 @@ def _openapi_of(place: Place, branch: int | None) -> dict[str, Any]:
     is_made = place.method == "POST" and not place.key and act.makes
     responses = {str(_MADE if is_made else _FOUND): success}
     responses |= {str(_ABSENT): {"description": ""}} if place.method == "GET" and place.key else {}
-    responses |= {str(_CONFLICT): {"description": ""}} if place.method != "GET" and act.operation.faults else {}
+    text = _text_with_409(act)
+    is_refused = place.method != "GET" and (act.operation.faults or "409" in text)
+    responses |= {str(_CONFLICT): {"description": ""}} if is_refused else {}
     found: dict[str, Any] = {
         "operationId": act.operation.name,
-        "description": _text_with_409(act),
+        "description": text,
         "parameters": parameters,
         "responses": responses,
     }
@@ -532,7 +538,7 @@ def _sentences_on(name: str, act: Act) -> str:
 def _text_with_409(act: Act) -> str:
     """Return the documentation of an operation, with a status in place of the faults that it declares."""
     names = [re.escape(local(tag)) for tag in act.operation.faults if local(tag) != "Fault"]
-    text = act.operation.documentation
+    text = _ELSE.sub(r"\g<1>409", act.operation.documentation)
     return re.sub(rf"\b(?:an? |the )?(?:{'|'.join(names)})\b", "409", text) if names else text
 
 

@@ -58,3 +58,13 @@ def test_a_body_with_one_object_around_its_values_is_sent_with_other_values_in_i
     bodies = [one for one in special_bodies(change, read, lambda: now, Values(), lambda _: True) if fits(taken, one)]
     assert bodies[-1] == now
     assert {"north", 40}.isdisjoint(bodies[0]["values"].values())
+
+
+def test_two_fractions_of_a_number_are_written(tmp_path):
+    taken = object_of(hold={"type": "number", "multipleOf": 0.01, "maximum": 600})
+    body, responses = body_of(taken), {"200": answers(taken)}
+    paths = {"/settings": {"get": {"responses": responses}, "put": {"requestBody": body, "responses": responses}}}
+    contract = Contract.load(write_described_pack(tmp_path, document := described(paths, "3.1.0"), document))
+    read, change = sorted(operations_of(contract), key=lambda operation: operation.method)
+    bodies = [*special_bodies(change, read, lambda: {"hold": 300}, Values(), lambda _: True)]
+    assert len({one["hold"] % 1 for one in bodies if fits(taken, one)} - {0}) == 2

@@ -1,5 +1,7 @@
 """SOAP operations are judged as resources: things, their states, and their lists in pages."""
 
+import re
+
 import pytest
 from press import WSDL, XSD, press
 from small_device import certified
@@ -70,6 +72,8 @@ def test_the_documentation_of_an_operation_is_that_of_the_values_that_have_none(
         ("Queued becomes running. In every other state InvalidStateFault.", {"running", "done", "cancelled"}),
         ("Queued becomes running, running becomes done. Otherwise InvalidStateFault.", {"done", "cancelled"}),
         ("InvalidStateFault if the job is done.", {"done"}),
+        ("Queued becomes running. In every other state a Client.State fault.", {"running", "done", "cancelled"}),
+        ("Queued becomes running. In every other state a motor fault stops it.", set()),
         ("By default at once, if it is queued. A motor fault if it is running stops it.", set()),
     ],
 )
@@ -77,6 +81,16 @@ def test_states_that_a_documentation_excludes(words, barred):
     found = _resources(WSDL.replace("Queued becomes running. In every other state InvalidStateFault.", words))
     operations = {one.id: one for one in operations_of(found.contract)}
     assert barred_by(operations["StartJob"], operations["GetJob"]).get("state", set()) == barred
+
+
+def test_a_documentation_may_name_a_fault_that_the_wsdl_does_not_declare():
+    text = "Queued becomes running. In every other state a fault."
+    wsdl = WSDL.replace("Queued becomes running. In every other state InvalidStateFault.", text)
+    found = _resources(re.sub(r"<(?:soap:)?fault\b[^>]*/>|<fault\b[^>]*>.*?</fault>", "", wsdl))
+    operations = {one.id: one for one in operations_of(found.contract)}
+    assert not any(place.act.operation.faults for place in found.places.values())
+    assert "409" in operations["StartJob"].responses
+    assert "409" not in operations["GetJob"].responses
 
 
 _JOB = "<c:jobId>J-0001</c:jobId><c:title>a</c:title><c:copies>1</c:copies><c:material>card</c:material>"
