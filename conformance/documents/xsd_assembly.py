@@ -257,7 +257,9 @@ def rpc_wrapper(name: str, space: str, parts: Sequence[tuple[str, str]]) -> Sche
     for other in spaces:
         if other != space:
             etree.SubElement(root, _IMPORT, namespace=other)
-    whole = etree.SubElement(etree.SubElement(root, clark(XSD, "element"), name=name), clark(XSD, "complexType"))
+    # No schema declares a wrapper, so one without parts may have xsi:nil, as that of SOAP::Lite has.
+    own = {"name": name} if parts else {"name": name, "nillable": "true"}
+    whole = etree.SubElement(etree.SubElement(root, clark(XSD, "element"), own), clark(XSD, "complexType"))
     inside = etree.SubElement(whole, clark(XSD, "sequence"))
     for part, type_ in parts:
         written = f"{prefixes[namespace(type_)]}:{local(type_)}" if namespace(type_) else local(type_)

@@ -512,3 +512,6 @@ def test_the_parts_of_an_rpc_message_may_have_types_of_several_namespaces():
     spaces = '<Get xmlns="urn:t"><p0 xmlns="">1</p0><p1 xmlns="">9</p1><p2 xmlns="">a</p2><p3 xmlns="">{}</p3></Get>'
     assert not found.types.invalid(etree.fromstring(spaces.format(9)))
     assert found.types.invalid(etree.fromstring(spaces.format(10)))
+    nil = '<{} xmlns="urn:t" xmlns:i="http://www.w3.org/2001/XMLSchema-instance" i:nil="true"/>'
+    assert not found.types.invalid(etree.fromstring(nil.format("GetResponse")))
+    assert found.types.invalid(etree.fromstring(nil.format("Get")))
