@@ -27,11 +27,12 @@ _SPACE, _SEPARATOR = re.compile(r"\s+"), re.compile(r"[\W_]+")
 
 
 class _Write(NamedTuple):
-    """A write whose texts a read must show: the request, its non-ASCII texts, the state and earlier texts.
+    """A write whose texts a read must show: its label and request, its non-ASCII texts, the state and earlier texts.
 
     A thing without a place of its own has its ``id`` in the list in which it was created.
     """
 
+    label: str
     request: Request
     texts: dict[str, str]
     before: dict[str, Any]
@@ -76,7 +77,8 @@ class Texts:
             self._written.clear()
             if texts and at and answer.status != HTTPStatus.ACCEPTED:
                 before = self._shown.get(at, {}) if id_ is None else {}
-                self._written[at] = _Write(request, texts, before, self._earlier.get(at, frozenset()), id_)
+                label = occasion.operation.label if occasion.operation else ""
+                self._written[at] = _Write(label, request, texts, before, self._earlier.get(at, frozenset()), id_)
             if at and len(self._earlier) < _MOST:
                 given = [one for one in sent.values() if isinstance(one, str)][:_MOST]
                 self._earlier[at] = frozenset(given) | self._earlier.get(at, frozenset())
@@ -91,7 +93,7 @@ class Texts:
             slug = _SEPARATOR.sub("-", _ascii(text)).strip("-")
             same = _plain(text) in _plain(seen) or _plain(seen).replace("_", "-") in {_ascii(text), slug}
             same |= write.id is not None and _plain(text).startswith(_plain(seen.rstrip(". \u2026")))
-            cause = f"{occasion.operation.label if occasion.operation else ''} {name} text"
+            cause = f"{write.label} {name} value"  # as in writes.py, which judges the same value
             # Servers that cannot store a character beyond the BMP cut the text there.
             is_begin = seen and text.startswith(seen) and text[len(seen) :].strip()[:1] < "\U00010000"
             doubt, found = "it may keep only the beginning of a text" if is_begin else "", f"{name} {clip(seen)}"

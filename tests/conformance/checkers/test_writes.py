@@ -484,6 +484,14 @@ def test_a_right_write_is_not_blamed(contract, name):
     assert _broken(contract, RIGHT[name]) == set()
 
 
+def test_a_text_that_is_lost_has_the_cause_of_a_value_that_is_lost(contract):
+    note, lost = "Gr\u00f6\u00dfe 5 \u00b5m", {**_FIRST, "note": "Gr??e 5 ?m"}
+    steps = (("GET", None, _FIRST), ("PUT", {**_WHOLE, "note": note}, lost), ("GET", None, lost))
+    exchanges = [exchange(method, f"{BASE}/plain", 200, shown, sent=body) for method, body, shown in steps]
+    (found,) = (case for case in failed(contract, BASE, exchanges) if case.requirement == READ)
+    assert found.cause == "PUT /plain note value"
+
+
 _BASE = "http://device"
 _KEY = {"type": ["string", "null"], "writeOnly": True}
 _USER = {"type": "object", "properties": {"name": {"type": "string"}, "key": _KEY}}
