@@ -168,6 +168,8 @@ class Feeder(Device):
         values = {**sent, "Quiet": {"1": "true", "0": "false"}.get(sent["Quiet"], sent["Quiet"])}
         if "mode burst refused" in self.faults and values["Mode"] == "burst":
             return None
+        if self.style == "narrow" and abs(float(values["Rate"])) > 99:
+            return None
         values["Label"] = self._label(values["Label"])
         values |= {"Note": values["Note"] or self.settings["Note"]} if "nil stays" in self.faults else {}
         values |= {"Offset": "0"} if "NaN is zero" in self.faults and values["Offset"] == "NaN" else {}

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from decimal import Decimal
 from functools import cached_property, partial
 from itertools import islice, starmap
 from typing import Final
@@ -64,6 +65,10 @@ _BLOCKS: Final = (
     ("a header block that another node must understand", "1", "urn:example:other"),
 )
 _GIVES: Final = frozenset({Role.WRITES, Role.CREATES})
+# Ends of built-in types, which a schema need not mean: xs:int says nothing of a device's limits.
+_ENDS: Final = frozenset(
+    Decimal(one) for bits in (15, 31, 63) for one in (-(2**bits), 2**bits - 1, 2 ** (bits + 1) - 1)
+)
 # The values of a message with their types.
 _Leaves = list[tuple[tuple[int, ...], Simple]]
 # An operation with the declaration of its request, and a message that it accepts.
@@ -355,15 +360,10 @@ class _Changes:
         for act, declared, node in self.acts:
             if act.role in {Role.CREATES, Role.REMOVES}:
                 continue
-            # A bound is no valid name of an existing thing.
-            free = frozenset(act.sent.keys() - asked if act.role is Role.WRITES else ())
-            made_of = [*_alternatives(declared, node, free)] if declared and node else []
-            # Messages that write are sent without a part elsewhere, where the values are read back (_ends).
-            made_of += [*_without(declared, node)] if declared and node and act.role is not Role.WRITES else []
-            for says, made in made_of:
-                if self.caller.messages.found.types.invalid(parse(made.serialize())):
-                    continue
-                self._vary(act, node, says, partial(self.caller.messages.message, act.port, act.operation, made))
+            if declared and node:
+                # A bound is no valid name of an existing thing.
+                free = frozenset(act.sent.keys() - asked if act.role is Role.WRITES else ())
+                self._vary_values(act, declared, node, free)
             if act.role is Role.WRITES:
                 self.caller.ask(act, node, "the values that were there before")
         for act, _, node in [one for one in self.acts if one[0].role is Role.READS][: 1 if self._is_quick else 9]:
@@ -380,6 +380,19 @@ class _Changes:
             if other is not None:
                 # WS-I BP 1.1 R1127: the Body decides, or the message is refused.
                 self.caller.ask(act, node, f"a message with the SOAPAction of {other.operation.name}", action=other)
+
+    def _vary_values(self, act: Act, declared: Element, node: Node, free: frozenset[str]) -> None:
+        """Send a message with other values; ``free`` as in `_alternatives`."""
+        made_of = [*_alternatives(declared, node, free)]
+        for says, made in _alternatives(declared, node, free, of_types=True):
+            if (says, made) not in made_of:
+                self.caller.ask(act, made, says)
+        # Messages that write are sent without a part elsewhere, where the values are read back (_ends).
+        made_of += [*_without(declared, node)] if act.role is not Role.WRITES else []
+        for says, made in made_of:
+            if not self.caller.messages.found.types.invalid(parse(made.serialize())):
+                write = partial(self.caller.messages.message, act.port, act.operation, made)
+                self._vary(act, node, says, write)
 
     def _style(self, act: Act, node: Node | None, style: XmlStyle) -> bytes:
         """Return a message in a style."""
@@ -451,10 +464,13 @@ def _as_it_was(node: Node, leaves: _Leaves, began: dict[str, list[str]]) -> Node
     return node
 
 
-def _alternatives(declared: Element, node: Node, free: frozenset[str]) -> Iterator[tuple[str, Node]]:
+def _alternatives(
+    declared: Element, node: Node, free: frozenset[str], *, of_types: bool = False
+) -> Iterator[tuple[str, Node]]:
     """Yield further messages that may be valid, each with its description.
 
-    The values that are called as in ``free`` get the bounds of their types too.
+    The values that are called as in ``free`` get the bounds of their types too; with ``of_types``, the ends of built-in
+    types, which a device may well refuse.
     """
     leaves = simple_leaves(declared, node)
     types = [simple for _, simple in leaves]
@@ -469,7 +485,8 @@ def _alternatives(declared: Element, node: Node, free: frozenset[str]) -> Iterat
         others += [plain(type_) for type_ in simple.others if name.lower() in free]
         # Two values of one type may bound each other.
         if types.count(simple) == 1 and simple.builtin in NUMBERS and name.lower() in free:
-            others += [f"{bound:f}" for bound in (simple.minimum, simple.maximum) if bound is not None]
+            ends = (bound for bound in (simple.minimum, simple.maximum) if bound is not None)
+            others += [f"{bound:f}" for bound in ends if (bound in _ENDS) is of_types]
         if simple.builtin in STRINGS and name.lower() in free:
             others += ["\u00fc" * (simple.max_length or 0)][: (simple.max_length or _LONGEST) < _LONGEST]
         for other in others:

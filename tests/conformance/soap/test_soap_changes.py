@@ -1,5 +1,7 @@
 """What SOAP operations write, create and remove is read back: right devices are not blamed, faulty ones are."""
 
+import re
+
 import pytest
 from feeder import feeder
 from small_device import certified
@@ -80,6 +82,15 @@ def test_a_right_device_is_not_blamed_and_is_left_as_it_was(style, tmp_path):
         assert device.bins == {"1": "3", "2": "4"}
         for name in ("written-is-read", "refused-keeps", "created-is-there", "deleted-is-gone"):
             assert outcome.requirement(f"soap/{name}")["verdict"] == "pass"
+
+
+def test_a_device_may_refuse_the_ends_of_a_built_in_type(tmp_path):
+    device = feeder("narrow")
+    device.xsd = re.sub(r'("Rate"><xs:restriction base="xs:)double">.*?</xs', r'\1int"></xs', device.xsd)
+    selected = ("--call", "*", "--select", "soap/valid-accepted", "--select", "soap/written-is-read")
+    outcome = _certified(device, tmp_path, *selected)
+    assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
+    assert outcome.requirement("soap/valid-accepted")["verdict"] == "pass"
 
 
 @pytest.mark.parametrize("faults", _FAULTS, ids=", ".join)
