@@ -13,7 +13,7 @@ from conformance.api.soap.resources import BASE, Resources, SoapExchange
 from conformance.checkers.occasion import Occasion
 from conformance.checkers.rest import Histories
 from conformance.documents.openapi import SAFE, matching
-from conformance.transport.exchange import Attempt, Exchange
+from conformance.transport.exchange import Attempt, Exchange, Request
 from conformance.verdict.evidence import Case
 
 _FAILED: Final = 500
@@ -27,6 +27,17 @@ _AS_SOAP: Final = {
 _STATUS: Final = re.compile(r" status 2\d\d$")
 # End of what is expected of a state that no operation has changed.
 _BY_ITSELF: Final = "as it was read before"
+# End of what is expected of the first read after a write, and what may be special about the message that wrote.
+_WROTE: Final = "wrote it"
+_CHARSET: Final = re.compile(r"charset=[\"']?([\w-]+)", re.IGNORECASE)
+
+
+def _form_of(sent: Request) -> str:
+    """Return how the texts of a message are written, if not as characters in UTF-8; else an empty text."""
+    charset = _CHARSET.search(next((text for name, text in sent.headers if name.lower() == "content-type"), ""))
+    if charset is not None and charset[1].lower() != "utf-8":
+        return f" in {charset[1]}"
+    return " with character references" if b"&#" in sent.body else ""
 
 
 class SoapThings:
@@ -40,6 +51,7 @@ class SoapThings:
         self._resources, self._histories = resources, Histories(resources.contract)
         # Identifiers of the things that it had, by list.
         self._known: dict[str, set[str]] = defaultdict(set)
+        self._form = ""  # of the last message that wrote
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Yield the cases of one exchange."""
@@ -51,6 +63,7 @@ class SoapThings:
             self._histories.forget(deletes=True)
             return
         shown = self._resources.items_in(seen, self._known[context.target]) if isinstance(seen, SoapExchange) else ()
+        self._form = self._form if seen.request.method in SAFE else _form_of(attempt.request)
         for one in (seen, *shown):
             yield from self._cases(one)
 
@@ -69,7 +82,8 @@ class SoapThings:
                 # An axis, which always exists, may leave any state by itself.
                 is_alone = name == "states" and found.expected.endswith(_BY_ITSELF) and not self._is_created(seen)
                 doubt = case.doubt or ("it may have left the state by itself" if is_alone else "")
-                yield replace(case, requirement=f"soap/{name}", doubt=doubt)
+                expected = case.expected + self._form * case.expected.endswith(_WROTE)
+                yield replace(case, requirement=f"soap/{name}", doubt=doubt, expected=expected)
 
     def _is_created(self, seen: Exchange) -> bool:
         """Return whether an operation creates things where one was read."""

@@ -8,6 +8,7 @@ from small_device import certified
 from soap_devices import SOAP_11, serving
 
 from conformance.api.soap.resources import Resources
+from conformance.checkers.soap_memory import SoapThings
 from conformance.checkers.transitions import barred_by
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
@@ -116,6 +117,40 @@ def test_what_a_read_says_of_a_thing(header, status, answer, seen):
     response = Response(status, (("Content-Type", "text/xml"),), message(answer), 1.0)
     found = _resources().as_rest(Exchange(Request("POST", "http://press/press", (), sent), response))
     assert (found and (found.request.target, found.response.status)) == (seen and ("/jobs/J-0001", seen))
+
+
+@pytest.mark.parametrize(
+    ("charset", "written", "said"),
+    [
+        ("utf-8", "Gr\u00f6\u00dfe", "wrote it"),
+        ("iso-8859-1", "Gr\u00f6\u00dfe", "wrote it in iso-8859-1"),
+        ("utf-8", "Gr&#246;&#223;e", "wrote it with character references"),
+    ],
+)
+def test_a_lost_text_is_shown_with_the_form_in_which_it_was_written(charset, written, said):
+    spaces = f'xmlns:s="{SOAP_11}" xmlns:c="urn:press"'
+
+    def called(name, sent, seen):
+        documents = [
+            f"<s:Envelope {spaces}><s:Body><c:{one}>{inside}</c:{one}></s:Body></s:Envelope>"
+            for one, inside in ((name, sent), (f"{name}Response", seen))
+        ]
+        octets = f'<?xml version="1.0" encoding="{charset}"?>{documents[0]}'.encode(charset)
+        headers = (("Content-Type", f"text/xml; charset={charset}"),)
+        request = Request("POST", "http://press/press", headers, octets)
+        response = Response(200, (("Content-Type", "text/xml"),), documents[1].encode(), 1.0)
+        return Exchange(request, response)
+
+    id_, rest = "<c:jobId>J-0001</c:jobId>", "<c:copies>1</c:copies><c:material>card</c:material>"
+    read = [f"<c:job>{_JOB.replace('>a<', f'>{one}<')}<c:state>queued</c:state></c:job>" for one in ("a", "Gr??e")]
+    steps = (
+        called("GetJob", id_, read[0]),
+        called("UpdateJob", f"{id_}<c:title>{written}</c:title>{rest}", ""),
+        called("GetJob", id_, read[1]),
+    )
+    judge = SoapThings(_resources())
+    (found,) = {case.expected for step in steps for case in judge(step) if not case.holds}
+    assert found.endswith(said)
 
 
 @pytest.mark.parametrize(
