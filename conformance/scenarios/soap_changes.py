@@ -28,6 +28,7 @@ from conformance.documents.xsd_shapes import NUMBERS, STRINGS, Element, Simple, 
 from conformance.scenarios.described_messages import fields_of, target_of
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
 from conformance.scenarios.soap_survey import (
+    OTHER_ACTION,
     Caller,
     Kind,
     NotSoapError,
@@ -379,7 +380,7 @@ class _Changes:
             other = min(others, key=lambda one: len(one.needs), default=None)
             if other is not None:
                 # WS-I BP 1.1 R1127: the Body decides, or the message is refused.
-                self.caller.ask(act, node, f"a message with the SOAPAction of {other.operation.name}", action=other)
+                self.caller.ask(act, node, f"{OTHER_ACTION} {other.operation.name}", action=other)
 
     def _vary_values(self, act: Act, declared: Element, node: Node, free: frozenset[str]) -> None:
         """Send a message with other values; ``free`` as in `_alternatives`."""

@@ -38,6 +38,8 @@ _FORBIDDEN: Final = ("missing", "unknown", "lexical", "range")
 _MOST: Final = 4  # invalid messages of each kind of an operation at standard
 _USUAL: Final = 6  # usual messages of each operation
 _REPEATED: Final = 2
+#: Begins what is special about a message with the SOAPAction of another operation.
+OTHER_ACTION: Final = "a message with the SOAPAction of"
 # Longest time for one operation, s.
 _BUDGET_S: Final = 20.0
 _SURVEY_SHARE: Final = 0.85  # with a time limit, only usual messages are sent after this share of it

@@ -19,7 +19,7 @@ from conformance.rules.description import test_lives, test_resources
 from conformance.rules.soap.own_state import entries, probes_left
 from conformance.scenarios.rule import Note, Outcome, Rule, rule
 from conformance.scenarios.soap_changes import soap_changes
-from conformance.scenarios.soap_survey import Kind, NotSoapError, SoapProbe, soap_survey, wsdl_faults
+from conformance.scenarios.soap_survey import OTHER_ACTION, Kind, NotSoapError, SoapProbe, soap_survey, wsdl_faults
 from conformance.scenarios.soap_things import Things, soap_things
 from conformance.transport.exchange import NoAnswer
 from conformance.verdict.evidence import Case
@@ -41,6 +41,10 @@ _VALUES = re.compile(r"'(?!\{)[^']*'|(?<=fault: ).*|\d+(?=, column|\)|$)", re.DO
 # How a device says that it lacks an operation (ONVIF Core, 5.11.2; WS-Addressing SOAP Binding, 6.4.2).
 _OPTIONAL = re.compile(r"not\s?(?:supported|implemented)", re.IGNORECASE)
 _VALID = frozenset({Kind.USUAL, Kind.TRIED})
+_BY_ACTION = (
+    "what SOAPAction names, though the Body decides which operation is called; a message in which the two differ may "
+    "also be refused (WS-I BP 1.1 R1127)"
+)
 _ASKED = frozenset({Kind.USUAL, Kind.VARIED})
 Trace = tuple[SoapProbe, ...]
 
@@ -169,9 +173,11 @@ def response_valid(trace: Trace, run: Run) -> Iterator[Outcome]:
         if not probe.response:  # WS-I BP 1.1, R2714, if the WSDL has no output
             what = "a Body that must be empty" if probe.response is not None else "response to a one-way operation"
             return "" if not inside else f"{inside[0].tag} in {what}"
-        if len(inside) != 1 or inside[0].tag != probe.response:
-            return f"{inside[0].tag if inside else 'an empty Body'} in place of {probe.response}"
-        return found.types.invalid(inside[0])
+        text = f"{inside[0].tag if inside else 'an empty Body'} in place of {probe.response}"
+        if len(inside) == 1 and inside[0].tag == probe.response:
+            text = found.types.invalid(inside[0])
+        # One cause, whichever operations it takes for each other.
+        return _BY_ACTION if text and probe.says.startswith(OTHER_ACTION) else text
 
     return _cases(trace, "a response that is valid by the WSDL", wrong)
 

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from feeder import feeder
+from feeder import WSDL, XSD, Feeder, feeder
 from small_device import certified
 from soap_devices import SOAP_11, camera, serving
 
@@ -91,6 +91,26 @@ def test_a_device_may_refuse_the_ends_of_a_built_in_type(tmp_path):
     outcome = _certified(device, tmp_path, *selected)
     assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
     assert outcome.requirement("soap/valid-accepted")["verdict"] == "pass"
+
+
+class _ByAction(Feeder):
+    """A feeder that calls the operation that SOAPAction names."""
+
+    action = ""
+
+    def app(self, environ, start):
+        self.action = environ.get("HTTP_SOAPACTION", "").strip('"').rpartition("/")[2]
+        return super().app(environ, start)
+
+    def answer(self, name, payload):
+        is_other = name.startswith("Get") and self.action in {"GetSettings", "GetRecipes"}
+        return super().answer(self.action if is_other else name, payload)
+
+
+def test_operations_that_are_called_by_soap_action_are_one_finding(tmp_path):
+    outcome = _certified(_ByAction("feeder", WSDL, XSD, {}), tmp_path, "--call", "*", "--select", "soap/response-valid")
+    (finding,) = outcome.requirement("soap/response-valid")["failures"]
+    assert "R1127" in finding["observed"]
 
 
 @pytest.mark.parametrize("faults", _FAULTS, ids=", ".join)
