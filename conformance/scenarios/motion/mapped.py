@@ -344,10 +344,15 @@ class MappedDevice:
                 # has left it then.
                 seen += self.watch(max(self.clock.now() + STAYS_S, command.answered + self._lasts_s))
                 if among(there, seen):
-                    return seen
+                    # A move may have its end later than its place.
+                    return seen + (self.watch(self.due(command), self._has_ended) if not self._has_ended(seen) else [])
             if self.clock.now() > self.due(command):
                 # A single reading after the end decides nothing.
                 return seen + [self.read() for _ in range(SEVERAL)]
+
+    def _has_ended(self, seen: list[Reading]) -> bool:
+        """Return whether the last move does not say that it runs, or need not say so."""
+        return self.motion.action is None or seen[-1].action not in self.motion.action.running
 
     def follow_several(
         self, commands: Sequence[Command], others: Sequence[Position] = ()
