@@ -55,7 +55,9 @@ _ROUNDS: Final = 6
 # How many times as many reads must show a value that nothing has set: it may change by itself now and then.
 _STEADY: Final = 4
 # Reads that must alternate between two values, at irregular times.
-_ALTERNATING: Final = 8
+_ALTERNATING: Final = 12
+# A read that takes longer is not repeated again and again, ms.
+_LONG_MS: Final = 300.0
 _OCTETS: Final = 65_536  # longest response that is compared, bytes
 # Digits of a text that may be a time, a count or an identifier.
 _DIGITS: Final = re.compile(r"(?:\D*\d){6}")
@@ -122,6 +124,7 @@ class _Experiment:
     # Paths of things that this run has created, by the template of their GET, with the operation that deletes them.
     _made: dict[str, tuple[str, Operation | None]] = field(default_factory=dict)
     _watched: list[tuple[Operation, Outgoing]] = field(default_factory=list)
+    _long: set[str] = field(default_factory=set)  # labels of reads that take long
 
     def __post_init__(self) -> None:
         self._operations = callable_operations(self.writer.api)
@@ -171,7 +174,8 @@ class _Experiment:
         reads = [one for (method, _), one in self._operations.items() if method == "GET"]
         for read in sorted(reads, key=lambda one: bool(one.parameter("path"))):
             request = self._request(read)
-            if len(self._watched) < _WATCHED[self._effort] and _values(self._send(request)):
+            found = self._attempt(_Try(read, request)) if len(self._watched) < _WATCHED[self._effort] else None
+            if found is not None and read.label not in self._long and _values(found):
                 self._watched.append((read, request))
 
     def _request(self, operation: Operation) -> Outgoing:
@@ -208,7 +212,8 @@ class _Experiment:
 
     def _tries(self) -> Iterator[_Try]:
         """Yield each GET, each GET of a thing that does not exist, HEAD and OPTIONS, and writes without credentials."""
-        reads = [one for (method, _), one in self._operations.items() if method == "GET"]
+        gets = (one for (method, _), one in self._operations.items() if method == "GET")
+        reads = [one for one in gets if one.label not in self._long]
         for read in reads:
             yield _Try(read, self._request(read))
             usual = usual_inputs(read, self.writer.values)[0]
@@ -253,7 +258,10 @@ class _Experiment:
         request = one.request
         with suppress(NotPermittedError):
             if one.authorized:
-                return self._send(request)
+                exchange = self._send(request)
+                is_long = exchange.response.elapsed_ms > _LONG_MS and self._effort != "slow"
+                self._long |= {one.operation.label} if is_long else set()
+                return exchange
             options: dict[str, Any] = {"headers": request.headers, "body": request.body, "authorized": False}
             sent = self.writer.api.client.send(request.method, request.target, fresh=True, **options)
             return sent if sent.response.status in _REFUSED else None

@@ -1,5 +1,6 @@
 """A GET, HEAD or OPTIONS that changes what no client writes is found; a device that records its requests is right."""
 
+import asyncio
 import time
 
 import pytest
@@ -162,3 +163,19 @@ def test_the_effect_of_a_safe_request_is_found(fault, said, tmp_path):
     judged, text = _judgement(tmp_path, fault, "--select=description/safe")
     assert judged["verdict"] == "fail", text
     assert said in text
+
+
+def test_a_read_that_takes_long_is_not_repeated_again_and_again(tmp_path):
+    house, reports = House(), []
+
+    async def report(_):
+        reports.append(time.monotonic())
+        await asyncio.sleep(0.4)
+        return web.json_response({"text": "all is well"})
+
+    description, routes = house.description(), house.routes() | {"/report": {"GET": report}}
+    description["paths"]["/report"] = reading(object_of("text", text=_TEXT))
+    with small_device(description, routes) as url:
+        done = certified(f"{url}/openapi.json", tmp_path / "out", "--call=*", "--select=description/safe")
+    assert done.requirement("description/safe")["verdict"] == "pass", done.text
+    assert len(reports) < 30, len(reports)
