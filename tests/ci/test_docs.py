@@ -103,7 +103,7 @@ def test_a_newcomers_way_through_the_pages(tmp_path):
         )
         statement.write_text(f'{text}\n[claims]\nclasses = ["rest-formats"]\n', encoding="utf-8")
         assert run("roaas keygen").returncode == 0
-        judged = run("roaas certify robot.toml --allow-motion --sign")
+        judged = run("roaas certify robot.toml --allow-motion --requirements 1.2 --sign")
         assert judged.returncode == 0, judged.stdout + judged.stderr
     out = tmp_path / "out"
     shutil.copy(tmp_path / "keys" / "public-key.pem", out)
