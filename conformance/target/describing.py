@@ -27,10 +27,11 @@ if TYPE_CHECKING:
 
 #: The folder of the pack, in the folder of the results.
 FOLDER: Final = "description"
-# Where APIs usually serve their description, tried if the URL itself is none.
+# Where APIs usually serve their description, tried if the URL itself is none: first below the URL's own path.
+_BELOW: Final = ("/openapi.json", "/openapi.yaml", "/swagger.json")
 _USUAL: Final = (
-    "/openapi.json", "/openapi.yaml", "/swagger.json", "/v3/api-docs", "/api/openapi.json", "/api-docs",
-    "/swagger/v1/swagger.json", "/api/v1/openapi.json", "/docs/openapi.json",
+    *_BELOW, "/v3/api-docs", "/api/openapi.json", "/api-docs", "/swagger/v1/swagger.json", "/api/v1/openapi.json",
+    "/docs/openapi.json", "/schema/openapi.json", "/documentation/json", "/api-json", "/openapi/v1.json",
 )  # fmt: skip
 
 
@@ -123,7 +124,7 @@ def fetch_description(
     except DescriptionError as error:
         if not is_url(source):
             raise
-        usual = _USUAL if len(urlsplit(source).path.strip("/").split("/")) <= 1 else ()
+        usual = _usual_places(source)
         for path in usual:
             try:
                 found = read_description(urljoin(source, path), load, overlays, trust)
@@ -135,6 +136,13 @@ def fetch_description(
             raise
         tried = f"{', '.join(usual[:2])} and {len(usual) - 2} other usual places have none either. " if usual else ""
         raise DescriptionError(f"{error}. {tried}Name the URL or file of its OpenAPI description") from error
+
+
+def _usual_places(source: str) -> tuple[str, ...]:
+    """Return the paths at which the description of an API is tried, given a URL that is none."""
+    folder = urlsplit(source).path.rstrip("/")
+    below = tuple(f"{folder}{path}" for path in _BELOW if folder and "." not in folder.rpartition("/")[2])
+    return (*below, *(_USUAL if folder.count("/") <= 1 else ()))
 
 
 def _check_server(source: str, base: str, endpoints: Endpoints, connection: Connection) -> None:

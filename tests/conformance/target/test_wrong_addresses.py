@@ -139,6 +139,24 @@ def test_a_description_that_is_found_elsewhere_is_said(tmp_path):
     assert f"The description was found at http://{place}/openapi.json." in planned.stderr
 
 
+@pytest.mark.parametrize(
+    ("given", "place"),
+    [
+        ("", "/schema/openapi.json"),  # Litestar
+        ("", "/documentation/json"),  # Fastify
+        ("", "/api-json"),  # NestJS
+        ("/robot7", "/robot7/openapi.json"),  # behind a prefix
+        ("/site/robot7", "/site/robot7/openapi.json"),
+    ],
+)
+def test_a_description_is_found_where_frameworks_serve_it(tmp_path, monkeypatch, given, place):
+    monkeypatch.setitem(SERVERS, "good", {"": SERVERS["empty"][""], place: SERVERS["good"]["/openapi.json"]})
+    with server("good") as host:
+        command = ["certify", f"http://{host}{given}", "--plan", "--out", str(tmp_path)]
+        done = CliRunner().invoke(roaas.main, command)
+    assert f"The description was found at http://{host}{place}." in done.stderr, done.output
+
+
 def test_options_of_the_papers_robot_are_no_options_of_a_described_one(tmp_path):
     with server("good") as place:
         code, text = told(tmp_path, f"http://{place}/openapi.json", "--publishers-wsdl", "http://robot/x?wsdl")
