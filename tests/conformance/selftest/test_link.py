@@ -93,11 +93,15 @@ def test_a_reset_is_handed_on(ends):
         client.recv(1)
 
 
-def test_where_nobody_listens_the_connection_is_broken_off(target):
-    nowhere = target.getsockname()
-    target.close()
+def _port_kept_by(deaf):
+    deaf.bind(("127.0.0.1", 0))
+    return deaf.getsockname()
+
+
+def test_where_nobody_listens_the_connection_is_broken_off():
     with (
-        link_to(QUICK, 1, nowhere) as (address,),
+        socket.socket() as deaf,  # it keeps its port, which another test's server could get otherwise
+        link_to(QUICK, 1, _port_kept_by(deaf)) as (address,),
         socket.create_connection(address, timeout=30) as client,
         pytest.raises(ConnectionResetError),
     ):
