@@ -32,6 +32,8 @@ _BELOW: Final = ("/openapi.json", "/openapi.yaml", "/swagger.json")
 _USUAL: Final = (
     *_BELOW, "/v3/api-docs", "/api/openapi.json", "/api-docs", "/swagger/v1/swagger.json", "/api/v1/openapi.json",
     "/docs/openapi.json", "/schema/openapi.json", "/documentation/json", "/api-json", "/openapi/v1.json",
+    "/openapi", "/q/openapi", "/v1/openapi.json", "/api/schema/", "/apispec_1.json", "/api/docs/swagger.json",
+    "/swagger/doc.json", "/doc", "/api-docs/openapi.json", "/openapi/openapi.json",
 )  # fmt: skip
 
 

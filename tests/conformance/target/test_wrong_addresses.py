@@ -145,6 +145,16 @@ def test_a_description_that_is_found_elsewhere_is_said(tmp_path):
         ("", "/schema/openapi.json"),  # Litestar
         ("", "/documentation/json"),  # Fastify
         ("", "/api-json"),  # NestJS
+        ("", "/openapi"),  # MicroProfile OpenAPI
+        ("", "/q/openapi"),  # Quarkus
+        ("", "/v1/openapi.json"),  # Connexion
+        ("", "/api/schema/"),  # drf-spectacular
+        ("", "/apispec_1.json"),  # Flasgger
+        ("", "/api/docs/swagger.json"),  # aiohttp-apispec
+        ("", "/swagger/doc.json"),  # swaggo
+        ("", "/doc"),  # Hono
+        ("", "/api-docs/openapi.json"),  # utoipa
+        ("", "/openapi/openapi.json"),  # flask-openapi3
         ("/robot7", "/robot7/openapi.json"),  # behind a prefix
         ("/site/robot7", "/site/robot7/openapi.json"),
     ],
