@@ -39,6 +39,7 @@ _FORMS: tuple[Callable[[float], str], ...] = (
     lambda value: repr(value) if value else "-0.0e-5",
 )
 _CHUNK_FORMS = (
+    ("nothing else", b"", b""),
     ("a chunk extension", b";part=1", b""),
     ("quoted chunk extensions", b';a="1;2";b', b""),
     ("trailer fields", b"", b"Checksum: 0\r\nX-Signed-By: nobody\r\n"),
@@ -140,15 +141,20 @@ def test_chunked_content(api: RestInterface, judge: Judge) -> None:
         ):
             what = f"{len(body)} bytes in chunks of {size}"
             _judge_chunked(api, judge, "http/chunked", call, raw.chunked(body, size), what)
-        for what, extension, trailers in _CHUNK_FORMS:
-            chunks = raw.chunked(call.body, 9, extension, trailers)
-            _judge_chunked(api, judge, "web-server/chunk-forms", call, chunks, f"chunks with {what}")
+        # A server error here is the web server's, and no other one of the API: Werkzeug answers 500 to an extension.
+        with judge.by_rule():
+            for what, extension, trailers in _CHUNK_FORMS:
+                chunks = raw.chunked(call.body, 9, extension, trailers)
+                if not _judge_chunked(api, judge, "web-server/chunk-forms", call, chunks, f"chunks with {what}"):
+                    break
 
 
-def _judge_chunked(api: RestInterface, judge: Judge, requirement: str, call: Call, chunks: bytes, what: str) -> None:
+def _judge_chunked(api: RestInterface, judge: Judge, requirement: str, call: Call, chunks: bytes, what: str) -> bool:
+    """Judge whether a body is accepted in chunks; return whether its response is that of an accepted one, or 411."""
     fields = (f"Content-Type: {call.media_type}", "Transfer-Encoding: chunked")
     attempt = by_hand.ask(api, call.operation.method, call.path, *fields, body=chunks)
-    expect(judge, requirement, attempt).accepts(f"the body comes as {what}", or_else=raw.refuses_chunks(attempt))
+    refused = raw.refuses_chunks(attempt)
+    return expect(judge, requirement, attempt).accepts(f"the body comes as {what}", or_else=refused)
 
 
 @pytest.mark.requirement("web-server/expect-continue")

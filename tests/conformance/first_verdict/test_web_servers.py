@@ -3,9 +3,10 @@
 import re
 
 import pytest
+from aiohttp import web
 from serving import CALL, serving
 from serving_apps import behind_nginx
-from small_device import certified
+from small_device import answers, body_of, certified, described, error, object_of, small_device
 
 from conformance.explaining.advice import topic_of
 
@@ -74,3 +75,21 @@ def test_the_advice_makes_each_rule_pass(server, framework, tmp_path):
             claims = ("--class", "web-server", "--class", "http")
             outcome = certified(f"{url}/openapi.json", tmp_path / "out", *claims, *CALL)
     assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
+
+
+@pytest.mark.parametrize("status", [400, 500])
+def test_a_server_that_reads_no_chunks_is_told_that(status, tmp_path):
+    size = object_of("size", size={"type": "integer"})
+
+    async def put(request: web.Request) -> web.Response:
+        if "Transfer-Encoding" in request.headers:  # as Django does behind gunicorn, and Werkzeug for an extension
+            return error(status, "no content")
+        if (text := await request.text()).startswith("[[[["):
+            return error(500, "no content")
+        return web.json_response({"size": 1}) if re.fullmatch(r'{"size": ?\d+}\s*', text) else error(400, "no size")
+
+    item = {"put": {"requestBody": body_of(size), "responses": {"200": answers(size), "4XX": {"description": "no"}}}}
+    with small_device(described({"/size": item}), {"/size": {"PUT": put}}) as url:
+        outcome = certified(f"{url}/openapi.json", tmp_path, "--call", "*")
+    told = next(one for one in outcome.result["web_server"]["requirements"] if one["id"] == "web-server/chunk-forms")
+    assert (told["verdict"], "comes as chunks with nothing else" in told["reason"]) == ("fail", True), told
