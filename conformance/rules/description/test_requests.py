@@ -29,6 +29,8 @@ _REFUSED = frozenset({400, 415, 422})
 _INVALID = frozenset({400, 422})
 # Doubt about a refusal of what the description allows.
 _FIT = "the values of a request may have to fit each other, or what the device does at the moment"
+_PARSER = "a JSON parser may accept more than JSON (RFC 8259 9), as those of Node.js and Go do"
+_UNSAID = "many frameworks demand a body and leave out `required: true` in their descriptions"
 # Methods whose requests' content has no meaning (RFC 9110 9.3.1, 9.3.2, 9.3.5).
 _WITHOUT_CONTENT = frozenset({"GET", "HEAD", "DELETE"})
 _WRONG = frozenset({Kind.INVALID, Kind.MALFORMED})
@@ -154,9 +156,15 @@ def _deletes_the_absent(trace: Survey) -> set[str]:
 
 
 def _doubt_of_content(probe: Probe) -> str:
-    """Return the doubt about a wrong content of a request whose method gives it no meaning."""
-    is_content = probe.attempt.request.method in _WITHOUT_CONTENT and _place_of(probe).startswith("body")
-    return "HTTP gives the content of this method no meaning, so a server may ignore it" if is_content else ""
+    """Return the doubt about a wrong content: its method gives it no meaning, or its parser may accept other texts."""
+    if not _place_of(probe).startswith("body"):
+        return ""
+    request = probe.attempt.request
+    if request.method in _WITHOUT_CONTENT:
+        return "HTTP gives the content of this method no meaning, so a server may ignore it"
+    content = read_json(request.body)
+    # As the Fetch standard, Node.js and Go do: each reads an octet that is no UTF-8 as U+FFFD.
+    return _PARSER if is_json(request.media_type) and content.encoding and not content.malformed else ""
 
 
 def _place_of(probe: Probe) -> str:
@@ -246,6 +254,7 @@ def defaults(trace: Survey) -> Iterable[Outcome]:
 def valid_accepted(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether requests that the description allows are accepted."""
     texts = {operation.label: operation.text for operation in operations_of(run.contract)}
+    bodied = {operation.label for operation in operations_of(run.contract) if operation.bodies}
     alone = (one for one in _with_known_path(trace, run) if one.ok or not _is_of_two(one, texts.get(one.operation, "")))
     trace = replace(trace, probes=tuple(alone))
     yield from _judge_accepted(trace, (Kind.OPTIONAL, Kind.BOUND), "a request that the description allows accepted")
@@ -257,6 +266,9 @@ def valid_accepted(trace: Survey, run: Run) -> Iterable[Outcome]:
     def fault(probe: Probe) -> Fault | None:
         if probe.status not in _REFUSED or probe.exchange is None:
             return None
+        if not probe.attempt.request.body and probe.operation in bodied:
+            observed = f"{_refusal(probe.exchange)}, for no body, which the description does not require"
+            return Fault("no body", observed, doubt=_UNSAID)
         return Fault(f"{probe.operation} {probe.status}", _refusal(probe.exchange), doubt=_FIT)
 
     valid = [one for one in generated if one.validity == VALID and not one.invents and not _is_extreme(one)]
@@ -355,4 +367,5 @@ def _refusal(exchange: Exchange | None) -> str:
     if exchange is None:
         return "no response"
     said = " ".join(exchange.response.body[:200].decode("utf-8", "replace").split())
+    said += "…" if len(exchange.response.body) > 200 else ""
     return f"status {exchange.response.status}: {said}" if said else f"status {exchange.response.status}"

@@ -36,7 +36,8 @@ def run(tmp_path_factory):
             "post": {
                 "requestBody": {"content": {"application/json": {"schema": _SCHEMA}}},
                 "responses": {"2XX": {"description": ""}, "404": _ERROR},
-            }
+            },
+            "put": {"requestBody": {"content": {"application/json": {"schema": _SCHEMA}}}, "responses": {}},
         },
         "/c": {"get": {"responses": {"200": {"description": ""}}}},
     }
@@ -339,6 +340,24 @@ def test_a_server_may_ignore_the_content_of_a_get(rule, kind, operation, is_doub
     wrong = _probe(kind=kind, operation=operation, says="a wrong body", place="body", sent=b"[1]")
     (finding,) = _failed(rule, Survey((wrong,)), run)
     assert bool(finding.doubt) == is_doubtful
+
+
+@pytest.mark.parametrize(("sent", "is_doubtful"), [(b'{"m": "\xff"}', True), (b'{"m": "\xff', False), (b"[1]", False)])
+def test_a_json_parser_may_replace_octets_that_are_no_utf_8(sent, is_doubtful, run):
+    wrong = _probe(kind=Kind.MALFORMED, operation=_OTHER, says="a wrong body", place="body", sent=sent)
+    (finding,) = _failed(requests.invalid_refused, Survey((wrong,)), run)
+    assert bool(finding.doubt) == is_doubtful
+
+
+def test_bodies_that_are_demanded_and_not_declared_required_are_told_once(run):
+    put = "PUT /b"
+    works = [_probe(201, b"", operation=one, sent=b'{"n": 1}') for one in (_OTHER, put)]
+    empty = {"kind": Kind.GENERATED, "validity": "valid"}
+    refused = [_probe(422, {"detail": one}, operation=one, **empty) for one in (_OTHER, put)]
+    (finding,) = _failed(requests.valid_accepted, Survey((*works, *refused)), run)
+    assert {one.operation for one in finding.operations} == {_OTHER, put}
+    assert "for no body, which the description does not require" in finding.observed
+    assert "leave out `required: true`" in finding.doubt
 
 
 def test_fractions_that_a_framework_cuts_are_told_once(run):
