@@ -117,7 +117,10 @@ def allow(occasion: Occasion) -> Iterator[Case]:
     besides, missing = named - wanted - _ALWAYS_ALLOWED, wanted - named if is_refused or is_claimed else set()
     # A framework's router may name the methods of one of several routes, so only a claimed contract demands them all.
     cause, left_out = f"{', '.join(sorted(besides))} besides", f"no {', '.join(sorted(missing))}"
-    declared, found = f"Allow: {', '.join(sorted(wanted))}, as declared", cause if besides else left_out
+    declared, found = (
+        f"Allow: {', '.join(sorted(wanted))}, as declared",
+        f"Allow: {said} ({cause if besides else left_out})",
+    )
     yield occasion.case("description/allow", not besides | missing, declared, found, cause=cause)
     if is_asked and not is_claimed:
         return  # a response to OPTIONS need not have Allow (RFC 9110 9.3.7), so it need not name all methods either

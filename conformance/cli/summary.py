@@ -50,6 +50,7 @@ def print_summary(outcome: Certification) -> None:
     _print_answers(document.get("motion", ()))
     for name, value in document["classes"].items():
         reason = document["class_reasons"].get(name, "")
+        reason = "the device refused the credentials" if reason == document.get("refused") else reason
         view = " (black box)" if document["class_views"].get(name) == "black box" else ""
         mark, blanks = click.style(_MARKS[value], fg=_COLOURS.get(value)), " " * (13 - len(_MARKS[value]))
         # On a narrow terminal the reason gets lines of its own.

@@ -142,7 +142,7 @@ class Progress:
         """Redraw the bar; or write a line when a stage begins, and when none was written for a while."""
         mark = item.get_closest_marker("phase")
         phase = mark.args[0] if mark else STAGES[0]
-        text = f"{item.name.partition('[')[0].removeprefix('test_').replace('_', ' ')} (stage: {phase})"
+        text = item.name.partition("[")[0].removeprefix("test_").replace("_", " ")
         now = time.monotonic()
         with self._writing:
             self._text, self._began = text, now

@@ -163,7 +163,6 @@ class RefusalListener(Listener):
                 f"The device accepted the credentials of {count_of(self.accepted, 'request')} and then answered "
                 f"{statuses}{challenge}: what came after was not judged. Give credentials that last as long as the run."
             )
-        whole = "" if not self.open else " for what demands credentials"
         advice = (
             "Check that the credentials are right and have not expired, and that they may do this."
             if self.has_credentials
@@ -171,5 +170,7 @@ class RefusalListener(Listener):
             " --headers-file for any other header, such as a lease."
         )
         count = self.refused.total()
-        said = f"The only request{whole} was" if count == 1 else f"All {count} requests{whole} were"
-        return f"{said} answered {statuses}{challenge}: nothing was judged. {advice}"
+        said = "The only request for what demands credentials was"
+        if count > 1:
+            said = f"All {count} requests for what demands credentials were"
+        return f"{said} answered {statuses}{challenge}: only what needs none was judged. {advice}"

@@ -16,7 +16,7 @@ from urllib.parse import unquote, urlsplit
 
 from conformance.api.rest.applicable import allows
 from conformance.api.rest.listing import items_of
-from conformance.api.rest.things import collection_of, may_create
+from conformance.api.rest.things import collection_of, id_member, may_create
 from conformance.api.rest.values import IDS
 from conformance.documents.files import keeps_octets
 from conformance.documents.json_text import read_json
@@ -46,9 +46,11 @@ class LeftBehind:
 
     def __init__(self, operations: Iterable[Operation], base_url: str) -> None:
         self._base_url = base_url
-        self._collections = {collection_of(operation.template) for operation in operations} - {""}
+        items = ((collection_of(operation.template), operation) for operation in operations)
+        self._items = {collection: item for collection, item in items if collection}
         self._created: dict[str, tuple[str, str]] = {}
         self._new: set[str] = set()
+        self._of_own: set[str] = set()
         self._changed: dict[str, tuple[str, bytes | None]] = {}
         self._deleted: dict[str, str] = {}
         self._read: dict[str, bytes] = {}
@@ -70,13 +72,17 @@ class LeftBehind:
             ours = [text for text in self._created if text == path or text.startswith(f"{path.rstrip('/')}/")]
             for text in ours:
                 del self._created[text]
-            if not ours:
+            if ours:
+                self._of_own.add(operation.label)
+            else:
                 self._deleted[path] = operation.label
         elif made:
+            self._of_own.add(operation.label)
             self._created[made] = operation.label, unquote(made.rstrip("/").rpartition("/")[2])
             known = self._read.get(path.rstrip("/"), self._read.get(path))
             items = None if known is None else items_of(read_json(known).value)
-            ids = {str(one.get(name)) for one in items or () if isinstance(one, dict) for name in IDS}
+            item = self._items.get(operation.template.rstrip("/"))
+            ids = {str(_id_of(one, item)) for one in items or ()}
             is_new = items is not None and may_create(operation, answer.status) and self._created[made][1] not in ids
             if answer.status == HTTPStatus.CREATED or is_new:
                 self._new.add(made)
@@ -102,11 +108,10 @@ class LeftBehind:
             target = joined(exchange.request.url, location)
             made = path_of(target) if is_same(target, exchange.request.url) else ""
             return made.removeprefix(urlsplit(self._base_url).path.rstrip("/"))
-        if answer.status != HTTPStatus.CREATED and operation.template.rstrip("/") not in self._collections:
+        item = self._items.get(operation.template.rstrip("/"))
+        if item is None and answer.status != HTTPStatus.CREATED:
             return ""
-        value: Any = read_json(answer.body).value if is_json(answer.media_type) else None
-        members = value if isinstance(value, dict) else {}
-        id_ = next((members[name] for name in IDS if isinstance(members.get(name), str | int)), None)
+        id_ = _id_of(read_json(answer.body).value if is_json(answer.media_type) else None, item)
         return "" if id_ is None else f"{path.rstrip('/')}/{id_}{'/' if path.endswith('/') else ''}"
 
     def created_in(self, collection: str) -> list[str]:
@@ -159,13 +164,13 @@ class LeftBehind:
         last = [{"operation": label, "status": status} for label, status in reversed(self._last.items())]
         if not last:
             return {}
-        said = {*created, *deleted, *(label for label, _ in self._changed.values())}
+        said = {*self._of_own, *deleted, *(label for label, _ in self._changed.values())}
         lines = (
             ("created and not deleted", [_things(label, ids) for label, ids in created.items()]),
             ("changed", [f"{path[:_ID]} by {label.partition(' ')[0]}" for path, label in changed.items()]),
             ("deleted", [_things(label, ids) for label, ids in deleted.items()]),
             (
-                "answered last",
+                "called last",
                 [f"{item['operation']} with {item['status']}" for item in last if item["operation"] not in said],
             ),
         )
@@ -176,6 +181,14 @@ class LeftBehind:
             "deleted": [{"operation": label, "ids": ids} for label, ids in deleted.items()],
             "last": last,
         }
+
+
+def _id_of(value: Any, item: Operation | None) -> str | int | None:
+    """Return the identifier of a representation: as its item's path has it, or else by the member's name."""
+    found = None if item is None else id_member(value, item)[1]
+    members = value if isinstance(value, dict) else {}
+    by_name = (members[name] for name in IDS if isinstance(members.get(name), str | int))
+    return next(by_name, None) if found is None else found
 
 
 def _send(api: RestInterface, method: str, path: str, was: bytes | None = None) -> Exchange | None:

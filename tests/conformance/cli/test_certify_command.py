@@ -159,7 +159,7 @@ def _broken_off(tmp_path, where, break_off):
     """A run that something happens to while the robot moves: its exit code and its result."""
     words = ["certify", *where, "--allow-motion", "--out", tmp_path, "--wait", "2", "--effort", "quick"]
     with Begun(*words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
-        _until(run, "(stage: motion)")
+        _until(run, "| goal drives")
         break_off(run)
         said, errors = run.communicate(timeout=240)
     assert "Traceback" not in said + errors

@@ -33,7 +33,7 @@ def test_a_right_device_that_keeps_state_gets_the_same_verdict_again(tmp_path: P
     assert left[0].startswith("created and not deleted: 5 by POST /queue (ids … 3, 4, 5), ")
     assert left[1:] == [
         "deleted: 3 by DELETE /logs/{id} (ids 3, 1, 2)",
-        "answered last: POST /lease with 201, POST /return-home with 200, POST /stop with 200 and 1 more",
+        "called last: POST /lease with 201, POST /return-home with 200, POST /stop with 200 and 1 more",
     ]
     assert device.speed == 1, "what PUT changed is written back"
     created = [one for outcome in (first, second) for one in outcome.result["api"]["left_behind"]["created"]]

@@ -54,6 +54,8 @@ def _left(*exchanges):
     [
         (201, _CREATED, []),
         (200, _CREATED, []),
+        (201, {"job_id": 7, "place": "dock"}, []),
+        (201, {"job": {"jobId": 7}}, []),
         (201, None, ["/api/jobs/7"]),
         (201, None, ["http://robot/api/jobs/7"]),
         (201, None, ["jobs/7"]),
@@ -69,6 +71,7 @@ def test_what_was_created_stays_until_it_is_deleted(status, body, location):
     ):
         left = _left(created, ending)
         assert (left["created"], left["deleted"]) == ([], [])
+        assert left["lines"] == []
     refused = ("DELETE /jobs/{id}", "/jobs/7", 409, None)
     assert _left(created, refused)["created"] == [{"operation": "POST /jobs", "ids": ["7"]}]
 
@@ -101,7 +104,7 @@ def test_the_latest_success_comes_first_and_refusals_change_nothing():
         ("POST /start", "/start", 409, None),
     )
     assert left["last"] == [{"operation": "POST /move", "status": 200}, {"operation": "POST /start", "status": 200}]
-    assert left["lines"] == ["answered last: POST /move with 200, POST /start with 200"]
+    assert left["lines"] == ["called last: POST /move with 200, POST /start with 200"]
     assert _left(("POST /start", "/start", 409, None), ("GET /jobs", "/jobs", 200, [])) == {}
 
 
