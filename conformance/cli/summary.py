@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from conformance.api.rest.things import collection_of
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.help_pages import columns, inert, say, wrap
 from conformance.contract.classes import QUESTIONS
@@ -159,6 +160,10 @@ def _print_unshown(rows: list[dict[str, Any]]) -> None:
         click.echo("  values that the device knows, in a statement, may help:\n    [values]")
         for name in names:
             click.echo(f'    {inert(json.dumps(name, ensure_ascii=False))} = ["…"]')
+    uncalled = {row["operation"] for row in rows if not row["called"]}
+    creators = {f"POST {collection_of(row['operation'].partition(' ')[2])}" for row in unshown if row.get("values")}
+    if found := sorted(creators & uncalled):
+        say(f"  or let the run create them: {' '.join(f'--call {shlex.quote(inert(label))}' for label in found)}")
 
 
 def _print_left(lines: Sequence[str]) -> None:

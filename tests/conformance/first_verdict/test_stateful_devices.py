@@ -91,3 +91,15 @@ def _broken(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
     with small_device(DESCRIPTION, device.routes) as url:
         more = ("--call", "*", "--select", "description/body-schema")
         return certified(f"{url}/openapi.json", tmp_path_factory.mktemp("broken"), *more)
+
+
+def test_a_thing_that_a_run_may_create_is_offered_beside_values(tmp_path: Path) -> None:
+    async def nothing(request: web.Request) -> web.Response:
+        return web.json_response({"detail": "none"}, status=404) if request.match_info else web.json_response([])
+
+    routes = {"/jobs": {**StatefulDevice().routes["/jobs"], "GET": nothing}, "/jobs/{id}": {"GET": nothing}}
+    item = {"get": DESCRIPTION["paths"]["/jobs/{id}"]["get"]}
+    paths = {"/jobs": DESCRIPTION["paths"]["/jobs"], "/jobs/{id}": item}
+    with small_device({**DESCRIPTION, "paths": paths}, routes) as url:
+        done = certified(f"{url}/openapi.json", tmp_path / "out")
+    assert "  or let the run create them: --call 'POST /jobs'\n" in done.text
