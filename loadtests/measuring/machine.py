@@ -115,17 +115,12 @@ def _throttled_s() -> float:
     return max(found)
 
 
-#: Requests a second, of one process, up to which it is idle most of the time.
-MOST_RATE = 1000.0
-
-
 def leaves_the_robot_room(plan: Plan, processors: int) -> bool:
-    """Return whether the workers may run first: open model, moderate rate, and a processor left for the robot.
+    """Return whether the workers may run first: they are mostly idle, and a processor is left for the robot.
 
     It assumes that all workers are on this machine.
     """
-    moderate = plan.load.rate is not None and plan.load.rate / plan.workers <= MOST_RATE
-    return moderate and plan.open_model and plan.step_rate is None and plan.workers < processors
+    return plan.mostly_idle and plan.workers < processors
 
 
 @contextmanager

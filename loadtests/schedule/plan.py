@@ -23,6 +23,8 @@ import numpy as np
 from loadtests.clients.payloads import CLIENTS, INTERFACES, MOVES
 
 GAP_S = 0.010
+#: Requests a second, of one worker, up to which it is idle most of the time.
+IDLE_RATE = 1000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,6 +184,12 @@ class Plan:
     def open_model(self) -> bool:
         """Return whether requests start on schedule, also while earlier ones wait for their responses."""
         return self.load.users is None
+
+    @property
+    def mostly_idle(self) -> bool:
+        """Return whether each worker is idle most of the time: the open model at up to `IDLE_RATE`, without steps."""
+        rate = self.load.rate
+        return rate is not None and rate / self.workers <= IDLE_RATE and self.open_model and self.step_rate is None
 
     @cached_property
     def blocks(self) -> int:

@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from loadtests.schedule.plan import Plan
+from loadtests.schedule.plan import IDLE_RATE, Plan
 from loadtests.statistics.against import DECIDING, NOT_SLOWER, SLOWER, UNCLEAR, Against, Change
 from loadtests.statistics.comparisons import Judged, SoapOverRest
 from loadtests.statistics.counts import Counts
@@ -103,7 +103,7 @@ def invalid_because(
         )
     if plan.open_model:
         # Two robots are compared by their service times, which begin at the actual start: lag affects both alike.
-        (notes if plan.robots > 1 else reasons).extend(_late(figures, pacing, spoilt))
+        (notes if plan.robots > 1 else reasons).extend(_late(figures, plan, pacing, spoilt))
         if counts.lost > (1 - LEAST_ACHIEVED) * counts.asked:
             reasons.append(f"{counts.lost} of {counts.asked} requests were neither sent nor given up")
     if figures.resends:
@@ -111,7 +111,7 @@ def invalid_because(
     return reasons, notes
 
 
-def _late(figures: GeneratorFigures, pacing: str, spoilt: Sequence[str]) -> list[str]:
+def _late(figures: GeneratorFigures, plan: Plan, pacing: str, spoilt: Sequence[str]) -> list[str]:
     late = [
         f"{lag:.3f} ms ({name}; a valid run allows {limit:.3f} ms)"
         for name, limit in figures.lag_limits_ms.items()
@@ -120,7 +120,10 @@ def _late(figures: GeneratorFigures, pacing: str, spoilt: Sequence[str]) -> list
     if not late:
         return []
     causes = "; ".join(spoilt) or "the generator's machine is overloaded"
-    hint = "" if figures.real_time else "; with CAP_SYS_NICE the generator would run before other processes"
+    needed = "with CAP_SYS_NICE and a processor left for the robot"
+    if not plan.mostly_idle:
+        needed = f"at up to {IDLE_RATE:,.0f} requests/s for each of its processes"
+    hint = "" if figures.real_time else f"; {needed}, the generator would run before other processes"
     return [f"requests started {' and '.join(late)} after their time ({pacing}): {causes}{hint}"]
 
 

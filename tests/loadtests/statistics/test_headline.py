@@ -7,8 +7,9 @@ import pytest
 from loadtests.schedule.plan import Load, Plan
 from loadtests.statistics.against import Against, Change
 from loadtests.statistics.comparisons import SoapOverRest
+from loadtests.statistics.counts import Counts
 from loadtests.statistics.figures import Series
-from loadtests.statistics.headline import Found, headline
+from loadtests.statistics.headline import Found, GeneratorFigures, headline, invalid_because
 
 PLAN = Plan(("delivery",), ("rest", "soap"), ("wire",), Load(200.0, None, 20.0, 2.0, "constant", 1), 10.0, 1, 32)
 FOUND = Found(PLAN, most_rate=500.0)
@@ -162,3 +163,27 @@ def test_a_run_on_a_busy_machine_gives_no_interval_for_its_p99():
     busy = headline(replace(FOUND, series=[entry], busy="load average 9.0 on 2 CPUs"))["sentence"]
     assert "99 of 100 take at most 0.400 ms: " in busy
     assert "another run will differ by more than the intervals say, most of all at the 99th percentile" in busy
+
+
+@pytest.mark.parametrize(
+    ("rate", "real_time", "hint"),
+    [
+        (200.0, False, "; with CAP_SYS_NICE and a processor left for the robot, the generator would run before"),
+        (1500.0, False, "; at up to 1,000 requests/s for each of its processes, the generator would run before"),
+        (200.0, True, "overloaded"),
+    ],
+)
+def test_what_keeps_a_late_generator_in_time_is_named_by_what_it_lacks(rate, real_time, hint):
+    lag = {"p50": 0.01, "p99": 2.0}
+    limits = {"p50": 0.05, "p99": 0.3}
+    late = GeneratorFigures(
+        cpu_share=0.2, lag_ms=lag, lag_limits_ms=limits, real_time=real_time, late=9, connects=1, resends=0
+    )
+    counts = Counts(**dict.fromkeys(Counts.__struct_fields__, 100) | {"failed": {}, "lost": 0, "not_sent": 0})
+    plan = replace(PLAN, load=replace(PLAN.load, rate=rate))
+    (reason,), _ = invalid_because(late, counts, plan, "timerfd", ())
+    assert reason.startswith(
+        "requests started 2.000 ms (p99; a valid run allows 0.300 ms) after their time (timerfd): "
+    )
+    assert reason.endswith("overloaded" if real_time else " other processes")
+    assert hint in reason
