@@ -144,7 +144,8 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     deviation = between_runs(outcome.before.load, len(measured.repeats))
     comparisons = soap_over_rest(measured, deviation)
     reasons, notes = ([str(aborted)], []) if aborted else invalid_because(generator, counted, plan, pacing, spoilt)
-    reasons = _endings(outcome, plan) + reasons + outcome.invalid
+    stopped = _stopped(outcome, counted, plan.timeout_s)
+    reasons = [stopped] if stopped else _endings(outcome, plan) + reasons + outcome.invalid
     overloaded = None if aborted or reasons or outcome.interrupted else overload(measured, counted)
     undecided = (
         []
@@ -176,6 +177,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         overloaded,
         outcome.knee_searches,
         interrupted=outcome.interrupted and len(reasons) == 1 and bool(counted.answered),
+        stopped=stopped,
         busy=busy_text(machine, os.cpu_count() or 1),
     )
     document = {
@@ -221,12 +223,22 @@ def _why_undecided(settings: Settings, counted: counts.Counts) -> list[str]:
     return [] if judged else failures(counted)
 
 
+def _stopped(outcome: Outcome, counted: counts.Counts, timeout_s: float) -> str:
+    """Return from when on the robot answered nothing, and whether the load may be why; empty if it went on."""
+    if outcome.dead_at is None:
+        return ""
+    said = f"no request succeeded from {outcome.dead_at:.1f} s on"
+    if next(iter(counted.failed), "") != "timeout" or counted.asked_rate is None:
+        return said
+    return (
+        f"{said}; they took over {timeout_s:g} s: a lower --rate shows whether {counted.asked_rate:,.0f}/s was too much"
+    )
+
+
 def _endings(outcome: Outcome, plan: Plan) -> list[str]:
     """Return why the plan was not carried out to its end."""
     faults = outcome.executor.recorder.faults if outcome.executor else []
     found = [f"the scenario failed: {fault}" for fault in faults]
-    if outcome.dead_at is not None:
-        found.append(f"no request succeeded from {outcome.dead_at:.1f} s on")
     if outcome.interrupted:
         done = sum(carried.elapsed_s for carried in outcome.carried)
         begun_s = sum(carried.plan.length_s for carried in outcome.carried)

@@ -13,6 +13,7 @@ _JUDGED = {
 }
 _SHOWN = ("p50", "p90", "p95", "p99", "max")
 _TIMES = "service p50      p90      p95      p99      max  response p99   (ms)"  # heads the columns of these
+_CARRIED = 1.01  # more responses in the measured part than to its requests, and those of the warm-up are named
 #: When a request failed that the counts do not hold.
 _WHEN = {"preflight": ", before the run", "warmup": ", in the warm-up", "step": ", in the search for the knee"}
 
@@ -67,6 +68,8 @@ def _counts(counts: Mapping[str, Any], plan: Mapping[str, Any], *, in_stages: bo
     if offered and plan["rate"] and not in_stages and offered < 0.99 * plan["rate"]:
         asked += f": nothing was due in the gaps between {plan['blocks']:,} blocks"
     late = f", {counts['waiting_at_end']:,} of them when the time was over" if counts["waiting_at_end"] else ""
+    if achieved * seconds > 1 + _CARRIED * (counts["answered"] - counts["waiting_at_end"]):
+        late += ", with those of the warm-up that came late"
     rows = [
         ("asked", counts["asked"], asked),
         ("sent", counts["sent"], ""),

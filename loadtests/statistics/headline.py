@@ -158,6 +158,7 @@ _AGAINST = {
 }
 _WORTHLESS = "Not valid"
 _INTERRUPTED = "Interrupted"
+_STOPPED = "The robot stopped answering"
 _OVERLOADED = "The robot is overloaded"
 _UNDECIDED = "This run is inconclusive"
 _NOTHING = "No series has enough successful requests for a figure."
@@ -176,6 +177,7 @@ class Found:
         overload: how the robot was overloaded, if it was.
         knees: the `knee_search` of latency.json.
         interrupted: by Ctrl-C, and valid until then.
+        stopped: from when on the robot answered nothing, if it did not go on.
         busy: how busy the generator's machine was, if it had no processor to spare.
     """
 
@@ -190,6 +192,7 @@ class Found:
     overload: Overload | None = None
     knees: Sequence[Mapping[str, Any]] = ()
     interrupted: bool = False
+    stopped: str = ""
     busy: str = ""
 
 
@@ -216,6 +219,8 @@ def _verdict(found: Found) -> tuple[str, str]:
     """Return words and sentence of a run without its search for a knee."""
     if found.interrupted:
         return _INTERRUPTED, f"{_INTERRUPTED}; until then: {_result_words(found)[1]}"
+    if found.stopped:
+        return _STOPPED, f"{_STOPPED}: {found.stopped}."
     if found.worthless:
         return _WORTHLESS, f"These figures say nothing about the robot, because {'; '.join(found.worthless)}."
     judged = _levels(found.levels)

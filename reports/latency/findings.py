@@ -32,7 +32,13 @@ def sentences(result: Mapping[str, Any]) -> list[str]:
     lines = [sentence for item in told[:_MOST] for sentence in _of_series(item, result)]
     if len(told) > _MOST:
         lines.append(f"The other {len(told) - _MOST} are faster than these.")
-    return [*lines, *_of_streams(result), *_of_stops(result), *_limits(result, any(item["errors"] for item in told))]
+    return [*lines, *_of_streams(result), *_of_stops(result), *_limits(result, any(map(_failed, told)))]
+
+
+def _failed(one: Mapping[str, Any]) -> int:
+    """Return how many requests of a series failed, or never got a connection."""
+    number: int = one["errors"] + one.get("dropped", 0)
+    return number
 
 
 def _tail(one: Mapping[str, Any]) -> tuple[str, float]:
@@ -75,10 +81,11 @@ def _of_series(one: Mapping[str, Any], result: Mapping[str, Any]) -> Iterator[st
             f"A control loop that waits for each response of {name} can run about "
             f"{rate(float(f'{1000 / slow:.2g}'))} times a second, and is late in {_BEYOND[quantile]} turns."
         )
-    failed = one["errors"] + one.get("dropped", 0)
+    failed = _failed(one)
     if failed:
-        total = one["count"] + failed
-        yield f"{name}: {failed:,} of {total:,} requests failed{_how_often(failed / total, result, one)}."
+        total, dropped = one["count"] + failed, one.get("dropped", 0)
+        vain = f" ({dropped:,} of them got no connection in time)" if dropped else ""
+        yield f"{name}: {failed:,} of {total:,} requests failed{vain}{_how_often(failed / total, result, one)}."
 
 
 def _of_streams(result: Mapping[str, Any]) -> Iterator[str]:

@@ -124,3 +124,17 @@ def test_searches_for_the_knee_agree_on_a_known_capacity(bucket, load):
     assert run.result["headline"]["words"].startswith("REST breaks down at ")
     assert "Where it breaks" in latency_html(run.result)
     assert re.search(r"\| REST \| \d+ \|", latency_markdown(run.result))
+
+
+def test_a_robot_that_answers_too_late_is_told_as_one_that_stopped(bucket, load):
+    run = load(bucket(40), "--operation 'GET /state' --rate 300 --duration 12 --warmup 0.5 --timeout 1")
+    assert run.code == 4
+    assert run.result["headline"]["words"] == "The robot stopped answering"
+    assert re.search(
+        r"^The robot stopped answering: no request succeeded from \d\.\d s on; they took over 1 s: a lower --rate "
+        r"shows whether \d+/s was too much\.$",
+        run.out,
+        re.MULTILINE,
+    ), run.out
+    assert "say nothing about the robot" not in run.out
+    assert "No request failed" not in latency_html(run.result)
