@@ -48,6 +48,7 @@ DEFAULT_OUT = "out"  # as `roaas certify` does
 #: Threads of NumPy's linear algebra wait for one another by spinning, ten times as long on a busy machine.
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 _FILE = click.Path(path_type=Path)
+_GIVEN = click.Path(exists=True, dir_okay=False)
 _START = """\
 Measure how fast an operation of a device answers:
   roaas load http://robot:8000/openapi.json --operation 'GET /state' --rate 50
@@ -214,8 +215,8 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
 @click.option("--clock-field", metavar="POINTER", help="Place of the robot's time in the polled response: /now.")
 @options_of(Group.OUTPUT)
 @options_of(Group.CREDENTIALS)
-@click.option("--token-file", metavar="FILE", help="File with the robot's bearer token.")
-@click.option("--ca-file", metavar="FILE", help="Certificate authorities to trust.")
+@click.option("--token-file", type=_GIVEN, help="File with the robot's bearer token.")
+@click.option("--ca-file", type=_GIVEN, help="Certificate authorities to trust.")
 @credential_options
 @options_of(Group.COMPARED)
 @click.option("--against", metavar="URL|STATEMENT", help="Compare with another robot or version; the two take turns.")

@@ -39,11 +39,14 @@ def read_secret(path: str | Path) -> str:
     """Return the text of a file with a secret, without the blanks around it; see `warn_if_shared`.
 
     Raises:
-        OSError: the file cannot be read.
+        OSError: the file cannot be read; its text names the file.
         UnicodeDecodeError: it is not UTF-8.
     """
     warn_if_shared(path)
-    return Path(path).read_text(encoding="utf-8").strip()
+    try:
+        return Path(path).read_text(encoding="utf-8").strip()
+    except OSError as error:
+        raise OSError(f"the file {str(path)!r} with a secret cannot be read: {error.strerror}") from error
 
 
 def warn_if_shared(path: str | Path, *, at_once: bool = False) -> None:

@@ -170,7 +170,8 @@ class RefusalListener(Listener):
             " --headers-file for any other header, such as a lease."
         )
         count = self.refused.total()
-        said = "The only request for what demands credentials was"
-        if count > 1:
-            said = f"All {count} requests for what demands credentials were"
-        return f"{said} answered {statuses}{challenge}: only what needs none was judged. {advice}"
+        what = "the only request" if count == 1 else f"each of {count} requests"
+        return (
+            f"The device answered {statuses}{challenge} to {what} for what demands credentials: only what needs none "
+            f"was judged. {advice}"
+        )

@@ -144,7 +144,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     deviation = between_runs(outcome.before.load, len(measured.repeats))
     comparisons = soap_over_rest(measured, deviation)
     reasons, notes = ([str(aborted)], []) if aborted else invalid_because(generator, counted, plan, pacing, spoilt)
-    stopped = _stopped(outcome, counted, plan.timeout_s)
+    stopped = _silence(outcome, counted, plan.timeout_s)
     reasons = [stopped] if stopped else _endings(outcome, plan) + reasons + outcome.invalid
     overloaded = None if aborted or reasons or outcome.interrupted else overload(measured, counted)
     undecided = (
@@ -223,7 +223,7 @@ def _why_undecided(settings: Settings, counted: counts.Counts) -> list[str]:
     return [] if judged else failures(counted)
 
 
-def _stopped(outcome: Outcome, counted: counts.Counts, timeout_s: float) -> str:
+def _silence(outcome: Outcome, counted: counts.Counts, timeout_s: float) -> str:
     """Return from when on the robot answered nothing, and whether the load may be why; empty if it went on."""
     if outcome.dead_at is None:
         return ""

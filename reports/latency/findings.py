@@ -32,10 +32,10 @@ def sentences(result: Mapping[str, Any]) -> list[str]:
     lines = [sentence for item in told[:_MOST] for sentence in _of_series(item, result)]
     if len(told) > _MOST:
         lines.append(f"The other {len(told) - _MOST} are faster than these.")
-    return [*lines, *_of_streams(result), *_of_stops(result), *_limits(result, any(map(_failed, told)))]
+    return [*lines, *_of_streams(result), *_of_stops(result), *_limits(result, any(map(_failures, told)))]
 
 
-def _failed(one: Mapping[str, Any]) -> int:
+def _failures(one: Mapping[str, Any]) -> int:
     """Return how many requests of a series failed, or never got a connection."""
     number: int = one["errors"] + one.get("dropped", 0)
     return number
@@ -81,7 +81,7 @@ def _of_series(one: Mapping[str, Any], result: Mapping[str, Any]) -> Iterator[st
             f"A control loop that waits for each response of {name} can run about "
             f"{rate(float(f'{1000 / slow:.2g}'))} times a second, and is late in {_BEYOND[quantile]} turns."
         )
-    failed = _failed(one)
+    failed = _failures(one)
     if failed:
         total, dropped = one["count"] + failed, one.get("dropped", 0)
         vain = f" ({dropped:,} of them got no connection in time)" if dropped else ""

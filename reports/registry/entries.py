@@ -158,7 +158,7 @@ UNNAMED = "names no robot"
 # run (verdicts, classes), while a registry answers class by class, or a single request (nonce).
 _WORDS = {
     "max_age_days": "expired",
-    "requirement_sets": "another requirement set",
+    "requirement_sets": "judged by another set of requirements",
     "suites": "an unknown suite",
     "contract": "another contract",
     "requirements": "not the requirements of the suite",

@@ -562,3 +562,8 @@ def test_each_option_with_a_secret_tells_of_it_once(device, tmp_path):
     done = roaas("certify", f"{device.url}/openapi.json", *words, "--api-key", "query k", cwd=tmp_path)
     shared = re.findall(r"other users can read the (?:secret|private key) in ?\S*/(--[a-z-]+)", done.stderr)
     assert sorted(shared) == sorted(set(options) - {"--username-token-file"}), done.stderr
+
+
+def test_a_secret_that_cannot_be_read_is_told_by_its_file(tmp_path):
+    with pytest.raises(OSError, match=r"^the file '\S*none' with a secret cannot be read: No such file or directory$"):
+        read_secret(tmp_path / "none")

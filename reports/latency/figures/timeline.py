@@ -253,11 +253,11 @@ def leading(series: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
 
 @picture(
     "heat",
-    "Requests of the alternating blocks, by when they were sent and how long they took. A darker cell holds more "
-    "requests. Two bands mean that latency has two modes. A step means that the robot or the machine changed.",
+    "Requests of the alternating blocks, by when they were sent and how long they took. A cell in a stronger colour "
+    "holds more requests. Two bands mean two modes of latency. A step means that the robot or the machine changed.",
 )
 def heat(result: Mapping[str, Any]) -> Iterator[Panel]:
-    """Yield a heat map for each series: time of the run by service time, darker cells for more requests."""
+    """Yield a heat map for each series: time of the run by service time, in stronger colours for more requests."""
     found = result.get("heat_map") or {}
     edges = found.get("edges_ms", [])
     for series in leading(found.get("series", [])):

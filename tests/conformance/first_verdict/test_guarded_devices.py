@@ -130,16 +130,21 @@ def test_credentials_that_count_for_a_whole_connection_are_found(secret, tmp_pat
             "wrong-one",
             401,
             None,
-            r"All \d+ requests .* were answered 401 \(WWW-Authenticate: Bearer\): only what needs none was judged",
+            r"The device answered 401 \(WWW-Authenticate: Bearer\) to each of \d+ requests .* needs none was judged",
         ),
         (
             "wrong-one",
             403,
             None,
-            r"All \d+ requests for what demands credentials were answered 403: only what needs none was judged",
+            r"The device answered 403 to each of \d+ requests .*: only what needs none was judged",
         ),
         (SECRET, 401, 30, r"The device accepted the credentials of \d+ requests and then answered 401 .* not judged"),
-        ("", 401, None, r"All \d+ requests .* were answered 401 .* Give the device's credentials: --token-file"),
+        (
+            "",
+            401,
+            None,
+            r"The device answered 401 .* to each of \d+ requests .* Give the device's credentials: --token-file",
+        ),
     ],
 )
 def test_what_a_device_refused_altogether_is_said_first_and_is_not_green(given, refusal, lasts, said, secret, tmp_path):
@@ -215,8 +220,7 @@ def test_a_soap_service_that_refuses_every_message_is_said_first_and_is_not_gree
     with serving(device) as url:
         done = certified(f"{url}/camera.wsdl", tmp_path / "out")
     assert re.match(
-        rf"All \d+ requests for what demands credentials were answered {status}\b.*only what needs none was judged",
-        done.text,
+        rf"The device answered {status}\b to each of \d+ requests .*only what needs none was judged", done.text
     ), done.text
     assert (done.exit_code, done.result["verdict"]) == (4, "inconclusive"), done.text
     assert not {"fail", "warn"} & set(done.blamed.values())

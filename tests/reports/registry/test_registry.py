@@ -73,9 +73,9 @@ def test_a_robot_has_a_row_and_a_page(host):
 NOT_GREEN = [
     ({"days_ago": 366}, "expired"),
     ({"days_ago": -1}, "dated in the future"),
-    ({"requirement_set": None}, "another requirement set"),
-    ({"requirement_set": {"name": "1.2", "digest": "sha256:" + "8" * 64}}, "another requirement set"),
-    ({"requirement_set": {"name": "1.1", "digest": "sha256:" + "7" * 64}}, "another requirement set"),
+    ({"requirement_set": None}, "judged by another set of requirements"),
+    ({"requirement_set": {"name": "1.2", "digest": "sha256:" + "8" * 64}}, "judged by another set of requirements"),
+    ({"requirement_set": {"name": "1.1", "digest": "sha256:" + "7" * 64}}, "judged by another set of requirements"),
     ({"suite__digest": "sha256:" + "6" * 64}, "an unknown suite"),
     ({"effort": "quick"}, "too little effort"),
     ({"statement__motion_allowed": False}, "was not allowed to move"),
