@@ -39,6 +39,7 @@ _FORMATS: Final = 3
 # Why a value is wrong, for the two faults that frameworks refuse for every parameter.
 _OTHER_TYPE: Final = "which has another type"
 NO_WHOLE_NUMBER: Final = "which is no whole number"
+NO_OBJECT: Final = "a list instead of an object"
 _NOT_ASCII: Final = "which is none of its values, and beyond ASCII"
 _BOUNDS: Final = ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum")
 _BEYOND: Final = frozenset({"beyond its maximum", "at its exclusiveMaximum"})
@@ -61,7 +62,7 @@ def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variatio
     not_utf8 = replace(usual, body=b'{"roaas": "\xff\xfe"}')
     yield Variation(Kind.MALFORMED, "a body that is not UTF-8", "body", not_utf8)
     if "object" in kinds_of(body.schema) and len(kinds_of(body.schema)) == 1:
-        yield Variation(Kind.INVALID, "a list instead of an object", "body", replace(usual, body=[]))
+        yield Variation(Kind.INVALID, NO_OBJECT, "body", replace(usual, body=[]))
         nested = replace(usual, body=b"[" * _NESTED + b"]" * _NESTED)
         yield Variation(Kind.INVALID, f"{_NESTED:,} lists in each other", "body", nested)
     # A value that one alternative of a union forbids may be allowed by another alternative.

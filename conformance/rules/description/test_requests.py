@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 from conformance.api.rest.conversions import is_converted, unkept_members
-from conformance.api.rest.invalid_variations import NO_WHOLE_NUMBER
+from conformance.api.rest.invalid_variations import NO_OBJECT, NO_WHOLE_NUMBER
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.statuses import HELD
 from conformance.api.rest.validity import INVALID, VALID
@@ -83,7 +83,9 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
         # If a framework converts a type, it does so in every operation.
         converted = _CONVERTED.search(why)
         given = _json_type((converted[1] or converted[3]).lower()) if converted else ""
-        if given == "boolean":
+        if _place_of(probe) == "body" and (converted or probe.says == NO_OBJECT):
+            cause = "a body of another type"
+        elif given == "boolean":
             cause = "a boolean converted"
         elif probe.says.endswith(NO_WHOLE_NUMBER) and probe.place.startswith("body"):
             cause = "a fraction converted"
@@ -91,8 +93,7 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
             cause = f"{given} {converted[2]}"
         else:
             cause = f"{probe.operation} {without_numbers(probe.place) if probe.says else _place_in(why)}"
-        saw = f"status {probe.status}" + (f", although {why}" if why else "")
-        return Fault(cause, saw, doubt=_doubt_of_content(probe))
+        return Fault(cause, f"status {probe.status}{_because(why)}", doubt=_doubt_of_content(probe))
 
     yield from held_back(sure)
     converted = _convertible(trace, sure, run)
@@ -107,11 +108,18 @@ def types(trace: Survey, run: Run) -> Iterable[Outcome]:
     converted = _convertible(trace, sure, run)
 
     def fault(probe: Probe) -> Fault | None:
-        why = "" if probe.says else f", although {probe.why}"
+        why = "" if probe.says else _because(probe.why)
         return Fault("a type converted", f"status {probe.status}{why}") if id(probe) in converted else None
 
     acted = [one for one in sure if id(one) in converted or one.status in _REFUSED]
     yield from told_once(acted, "status 4xx for a value of a type that the description does not declare", fault)
+
+
+def _because(why: str) -> str:
+    """Return what is wrong in a generated request, as the end of a sentence."""
+    value, at, place = why.rpartition(" at ")
+    is_parameter = at and place.startswith(("path ", "query ", "header ", "cookie "))
+    return f", for {value} as {place}" if is_parameter else f", although {why}" if why else ""
 
 
 def _forbidden(trace: Survey) -> list[Probe]:
@@ -261,7 +269,8 @@ def valid_accepted(trace: Survey, run: Run) -> Iterable[Outcome]:
     # An operation that never accepts a request may need another state; another requirement judges its status.
     works = {one.operation for one in trace.probes if one.ok}
     generated = [one for one in trace.probes if one.kind is Kind.GENERATED and one.operation in works]
-    generated = [one for one in generated if one.status not in HELD]
+    told = _least_refused(trace)
+    generated = [one for one in generated if one.status not in HELD and _request_of(one) not in told]
 
     def fault(probe: Probe) -> Fault | None:
         if probe.status not in _REFUSED or probe.exchange is None:
@@ -274,6 +283,17 @@ def valid_accepted(trace: Survey, run: Run) -> Iterable[Outcome]:
     valid = [one for one in generated if one.validity == VALID and not one.invents and not _is_extreme(one)]
     yield from held_back(one for one in trace.probes if one.kind is Kind.GENERATED and one.validity == VALID)
     yield from told_once(valid, "a request that the description allows accepted", fault)
+
+
+def _least_refused(trace: Survey) -> set[tuple[str, str, bytes]]:
+    """Return what was sent and refused with nothing optional, which another rule judges."""
+    more = {one.operation for one in trace.probes if one.kind is Kind.OPTIONAL and one.ok}
+    least = [one for one in trace.probes if one.kind is Kind.USUAL and one.operation in more]
+    return {_request_of(one) for one in least if one.status in _REFUSED}
+
+
+def _request_of(probe: Probe) -> tuple[str, str, bytes]:
+    return probe.operation, probe.attempt.request.target, probe.attempt.request.body
 
 
 def _is_extreme(probe: Probe) -> bool:

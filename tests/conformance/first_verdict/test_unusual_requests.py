@@ -174,3 +174,21 @@ def test_a_right_device_with_unusual_requests_passes(tmp_path):
     declared = {(path, "Content-Type", media_type) for path, (_, media_type, *_) in _BODIES.items()}
     # Schemathesis writes no lines of JSON.
     assert declared - types == {("/lines", "Content-Type", "application/x-ndjson")}
+
+
+def test_a_404_by_a_router_that_knows_no_head_is_not_compared_with_that_of_get(tmp_path):
+    async def no_head(_):
+        return web.Response(status=404, text="Not Found")
+
+    async def absent(_):
+        return error(404, "there is no such job")
+
+    async def state(_):
+        return web.json_response({})
+
+    paths = {path: {"get": {"responses": _RESPONSES}} for path in ("/state", "/jobs/{id}")}
+    paths["/jobs/{id}"]["parameters"] = [_ID]
+    routes = {"/state": {"GET": state, "HEAD": no_head}, "/jobs/{id}": {"GET": absent, "HEAD": no_head}}
+    with small_device(described(paths), routes) as url:
+        outcome = certified(f"{url}/openapi.json", tmp_path)
+    assert not [one for one in outcome.blamed if one.startswith("http/head")], outcome.blamed

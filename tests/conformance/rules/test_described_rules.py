@@ -19,6 +19,7 @@ from conformance.verdict.run import Run
 
 _SCHEMA = object_of("n", n={"type": "integer"}, at={"type": ["string", "null"], "format": "date-time"})
 _ERROR = {"description": "", "content": {"application/problem+json": {"schema": {"required": ["detail"]}}}}
+_LEAST = Kind.USUAL, Kind.GENERATED
 _LABEL, _OTHER, _PLAIN = "GET /a/{id}", "POST /b", "GET /c"
 
 
@@ -347,6 +348,32 @@ def test_a_json_parser_may_replace_octets_that_are_no_utf_8(sent, is_doubtful, r
     wrong = _probe(kind=Kind.MALFORMED, operation=_OTHER, says="a wrong body", place="body", sent=sent)
     (finding,) = _failed(requests.invalid_refused, Survey((wrong,)), run)
     assert bool(finding.doubt) == is_doubtful
+
+
+def test_a_body_of_another_type_is_told_once_of_all_operations(run):
+    generated = {"kind": Kind.GENERATED, "validity": "invalid"}
+    probes = [
+        _probe(operation=_OTHER, kind=Kind.INVALID, says="a list instead of an object", place="body", sent=b"[]"),
+        *[
+            _probe(operation="PUT /b", why=f"the value is {one}, not of type object", sent=one.encode(), **generated)
+            for one in ("[]", "0", "false", '"A"')
+        ],
+    ]
+    (finding,) = _failed(requests.invalid_refused, Survey(tuple(probes)), run)
+    assert {one.operation: one.seen for one in finding.operations} == {_OTHER: 1, "PUT /b": 4}
+
+
+def test_a_wrong_parameter_is_named_as_the_survey_names_it(run):
+    wrong = _probe(kind=Kind.GENERATED, validity="invalid", why="'at AAA' at query offset")
+    (finding,) = _failed(requests.invalid_refused, Survey((wrong,)), run)
+    assert finding.observed == "status 200, for 'at AAA' as query offset"
+
+
+def test_what_is_refused_with_nothing_optional_is_told_once(run):
+    least = [_probe(422, {}, kind, operation=_OTHER, sent=b"{}", validity="valid") for kind in _LEAST]
+    more = _probe(201, b"", Kind.OPTIONAL, operation=_OTHER, sent=b'{"n": 1}', place="body /n")
+    both = (requests.optional, requests.valid_accepted)
+    assert [len(_failed(rule, Survey((*least, more)), run)) for rule in both] == [1, 0]
 
 
 def test_bodies_that_are_demanded_and_not_declared_required_are_told_once(run):
