@@ -358,6 +358,8 @@ def _arc(robot: Robot, drive: Drive, bent: Velocity, before: Velocity) -> None:
             # A PUT of the linear part need not renew the angular one, so command both again in time.
             drive.refresh(bent)
         drive.command(back, linear=True)
+        if not drive.trace.commands[-1].exchange.response.ok:
+            return  # refused, so that it changes nothing
         drive.keep(min(_SHOWS_S, drive.holds_until - drive.clock.now()))
         keeps, found = drive.sees(bent, 1.5, part=ANGULAR_PART, until=drive.holds_until)
         if keeps is not None:

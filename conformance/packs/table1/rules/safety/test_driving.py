@@ -57,7 +57,7 @@ def renewal(trace: Driven, run: Run) -> Iterator[Outcome]:
             found += (
                 one for name, wanted in drive.wanted.items() for one in judge_renewed(drive, name, wanted, motion)
             )
-    yield from found or [NotTested("responses came too late to renew a velocity within its hold time")]
+    yield from found or [NotTested("no velocity was renewed in time: it was refused, or responses came too late")]
 
 
 @rule("safety/refused-keeps", on=(turn,))
