@@ -171,3 +171,20 @@ def test_a_new_version_of_the_device_explains_a_change(pair):
     old, new = pair([requirement("pass")], [requirement("fail")])
     new["statement"]["robot"]["version"] = "9.0"
     assert difference(old, new).origin == "Changed between the runs: the device (2.4.1 → 9.0)."
+
+
+def test_a_description_alone_is_no_other_suite_and_a_version_is_told_of_the_statement(pair):
+    old, new = pair([requirement("pass")], [requirement("fail")])
+    for result, number in ((old, "1"), (new, "2")):
+        result["suite"]["digest"] = result["digests"]["statement"] = f"sha256:{number}"
+        result["digests"]["contract"] = {"openapi.json": f"sha256:{number}"}
+        result["api"] = {"version": f"{number}.0", "operations": []}
+        result["statement"]["robot"]["version"] = f"{number}.0"
+    found = difference(old, new)
+    assert found.origin.startswith(
+        "Changed between the runs: the statement, at least the device's version in it, the description (1.0 → 2.0), "
+        "the device (1.0 → 2.0). "
+    )
+    assert "suite's digest" not in {name for name, _, _ in found.circumstances}
+    new["digests"]["contract"] = old["digests"]["contract"]
+    assert difference(old, new).origin.startswith("Changed between the runs: the suite, the statement")
