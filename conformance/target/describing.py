@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from functools import cached_property
@@ -27,13 +28,17 @@ if TYPE_CHECKING:
 
 #: The folder of the pack, in the folder of the results.
 FOLDER: Final = "description"
+# The description in the script of swagger-ui-express, which indents it by JSON.stringify; without the copy that an
+# `await import("swagger.json")` adds as "default".
+_IN_SCRIPT: Final = re.compile(rb'"swaggerDoc": (\{.*?)(?:,\n    "default": \{.*?\n    \})?(\n  \})', re.DOTALL)
 # Where APIs usually serve their description, tried if the URL itself is none: first below the URL's own path.
-_BELOW: Final = ("/openapi.json", "/openapi.yaml", "/swagger.json")
+_BELOW: Final = ("/openapi.json", "/openapi.yaml", "/swagger.json", "/swagger-ui-init.js")
 _USUAL: Final = (
     *_BELOW, "/v3/api-docs", "/api/openapi.json", "/api-docs", "/swagger/v1/swagger.json", "/api/v1/openapi.json",
     "/docs/openapi.json", "/schema/openapi.json", "/documentation/json", "/api-json", "/openapi/v1.json",
     "/openapi", "/q/openapi", "/v1/openapi.json", "/api/schema/", "/apispec_1.json", "/api/docs/swagger.json",
-    "/swagger/doc.json", "/doc", "/api-docs/openapi.json", "/openapi/openapi.json",
+    "/swagger/doc.json", "/doc", "/api-docs/openapi.json", "/openapi/openapi.json", "/api-docs.json",
+    "/api-docs/swagger-ui-init.js", "/docs/swagger-ui-init.js",
 )  # fmt: skip
 
 
@@ -73,7 +78,9 @@ class Loader:
             UnreachableError: the server does not respond.
             OSError, ValueError: there is no such content, or the description must not refer to it.
         """
-        return self._fetch(source) if is_url(source) else self._folder.read(source)
+        content = self._fetch(source) if is_url(source) else self._folder.read(source)
+        found = _IN_SCRIPT.search(content) if urlsplit(source).path.endswith(".js") else None
+        return found[1] + found[2] if found else content
 
 
 def trusting(connection: Connection, *named: str | None) -> Trust:

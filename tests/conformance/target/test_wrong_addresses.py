@@ -155,16 +155,25 @@ def test_a_description_that_is_found_elsewhere_is_said(tmp_path):
         ("", "/doc"),  # Hono
         ("", "/api-docs/openapi.json"),  # utoipa
         ("", "/openapi/openapi.json"),  # flask-openapi3
+        ("", "/api-docs.json"),  # swagger-jsdoc
+        ("", "/api-docs/swagger-ui-init.js"),  # swagger-ui-express, which has no other document
+        ("/anywhere/", "/anywhere/swagger-ui-init.js"),
         ("/robot7", "/robot7/openapi.json"),  # behind a prefix
         ("/site/robot7", "/site/robot7/openapi.json"),
     ],
 )
 def test_a_description_is_found_where_frameworks_serve_it(tmp_path, monkeypatch, given, place):
-    monkeypatch.setitem(SERVERS, "good", {"": SERVERS["empty"][""], place: SERVERS["good"]["/openapi.json"]})
+    *head, content = SERVERS["good"]["/openapi.json"]
+    if place.endswith(".js"):
+        options = {"swaggerDoc": {**DESCRIPTION, "default": DESCRIPTION}, "customOptions": {}}
+        content = f"window.onload = function() {{\n  var options = {json.dumps(options, indent=2)};\n}}".encode()
+    monkeypatch.setitem(SERVERS, "good", {"": SERVERS["empty"][""], place: (*head, content)})
     with server("good") as host:
         command = ["certify", f"http://{host}{given}", "--plan", "--out", str(tmp_path)]
         done = CliRunner().invoke(roaas.main, command)
     assert f"The description was found at http://{host}{place}." in done.stderr, done.output
+    read = json.loads((tmp_path / "description" / "original.json").read_text(encoding="utf-8"))
+    assert read.keys() == DESCRIPTION.keys(), "tsoa's copy"
 
 
 def test_options_of_the_papers_robot_are_no_options_of_a_described_one(tmp_path):
