@@ -18,7 +18,7 @@ from conformance.api.rest.statuses import ANY_TIME, need_of
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema
 from conformance.documents.json_shape import shape_of
-from conformance.documents.openapi import Operation, is_json, matching, operations_of, resource_at
+from conformance.documents.openapi import Operation, is_json, operations_of, resource_at
 from conformance.documents.wsdl_pack import label_in, services_of
 from conformance.statement.motion_calls import named_by
 from conformance.transport.exchange import Exchange, Listener, Request, Unanswered
@@ -111,12 +111,14 @@ class OperationLog(Listener):
         return answer.status < _ERRORS or answer.status in _OF_STATE
 
     def _operation(self, request: Request) -> Operation | None:
-        if not request.url.startswith(self._base_url) or request.method in {"HEAD", "OPTIONS"}:
+        if not request.url.startswith(self._base_url):
             return None
         if self._services is not None:
             label = label_in(self._services, self._path(request), request.body)
             return next((item for item in operations_of(self._contract) if item.label == label), None)
-        return matching(self._contract, request.method, self._path(request))
+        # Other checks send HEAD and OPTIONS to every path: they count where the description declares them.
+        resource = resource_at(self._contract, self._path(request))
+        return resource.operations.get(request.method) if resource else None
 
     def _path(self, request: Request) -> str:
         return request.url[len(self._base_url) :].partition("?")[0]

@@ -65,6 +65,15 @@ def test_the_matrix_counts_what_was_sent_and_seen(tmp_path):
     assert (document["title"], document["version"]) == ("Arm", "2")
 
 
+def test_a_head_counts_where_it_is_declared(tmp_path):
+    paths = {"/a": {"get": {"responses": OK}, "head": {"responses": OK}}, "/b": {"get": {"responses": OK}}}
+    log = OperationLog(contract_of(tmp_path, API | {"paths": paths}), BASE)
+    for path in paths:
+        log.on_response(exchange(path, method="HEAD"))
+    rows = log.document(CallRules(), ())["operations"]
+    assert {row["operation"]: row["requests"] for row in rows} == {"GET /a": 0, "HEAD /a": 1, "GET /b": 0}
+
+
 POSE = {"type": "object", "properties": {"x": {"type": "number"}, "frame": {"type": "string"}}}
 
 
