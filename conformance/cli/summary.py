@@ -6,7 +6,7 @@ import json
 import re
 import shlex
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -37,6 +37,8 @@ _LINE = 160
 _REASON = 46  # column in which the reason of a class begins
 _NARROW = 4  # the same on a narrow terminal
 _WIDE = 100  # columns of a wide terminal
+# Keys of a statement's endpoints that name credentials.
+_CREDENTIALS = frozenset({"token_file", "basic_file", "api_key_file"})
 
 
 def print_summary(outcome: Certification) -> None:
@@ -93,7 +95,7 @@ def _print_counts(document: Mapping[str, Any]) -> None:
     order = ("fail", "inconclusive", "warn", _UNTESTED, "pass", not_claimed)
     told = ", ".join(f"{counts[value]} {value}" for value in order if counts[value])
     if "api" in document:
-        _print_unshown(document["api"]["operations"])
+        _print_unshown(document["api"]["operations"], document["statement"]["endpoints"])
         _print_left(document["api"].get("left_behind", {}).get("lines", ()))
         called, described = document["api"]["coverage"]["operations"]
         told = f"{called} of {described} operations called; {told}"
@@ -142,7 +144,7 @@ def _print_unjudged(document: Mapping[str, Any]) -> None:
         say(f"\nNot everything was tried\n  {inert(document['left_out']['text'])}")
 
 
-def _print_unshown(rows: list[dict[str, Any]]) -> None:
+def _print_unshown(rows: list[dict[str, Any]], given: Collection[str]) -> None:
     """Print the operations that never responded 2xx to a request, and what they would need."""
     unshown = [row for row in rows if row["requests"] and not any(code.startswith("2") for code in row["statuses"])]
     if not unshown:
@@ -155,6 +157,8 @@ def _print_unshown(rows: list[dict[str, Any]]) -> None:
         )
         need = f"; needs {row['needs']}" if "needs" in row else ""
         say(f"  {inert(row['operation'])}: {statuses}{need}")
+    if any("401" in row["statuses"] for row in unshown) and not _CREDENTIALS.intersection(given):
+        say("  credentials are given by --token-file, --basic-file or --api-key-file")
     names = sorted({name for row in unshown for name in row.get("values", ())})
     if names:
         click.echo("  values that the device knows, in a statement, may help:\n    [values]")
