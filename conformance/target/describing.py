@@ -38,7 +38,7 @@ _USUAL: Final = (
     "/docs/openapi.json", "/schema/openapi.json", "/documentation/json", "/api-json", "/openapi/v1.json",
     "/openapi", "/q/openapi", "/v1/openapi.json", "/api/schema/", "/apispec_1.json", "/api/docs/swagger.json",
     "/swagger/doc.json", "/doc", "/api-docs/openapi.json", "/openapi/openapi.json", "/api-docs.json",
-    "/api-docs/swagger-ui-init.js", "/docs/swagger-ui-init.js",
+    "/api-docs/swagger-ui-init.js", "/docs/swagger-ui-init.js", "/openapi/json", "/swagger/json",
 )  # fmt: skip
 
 

@@ -34,12 +34,15 @@ _OTHER_TYPES: Final = ("text/plain", "application/xml")
 _MOST_ITEMS: Final = 100
 # Lists in each other, which parsers that call themselves for each do not survive.
 _NESTED: Final = 20_000
+_LISTS: Final = f"{_NESTED:,} lists in each other"
+_LIST: Final = "a list instead of an object"
+#: What the bodies that are no object say of themselves.
+NO_OBJECT: Final = frozenset({_LIST, _LISTS})
 # Response formats that are requested together with a wrong value, at most.
 _FORMATS: Final = 3
 # Why a value is wrong, for the two faults that frameworks refuse for every parameter.
 _OTHER_TYPE: Final = "which has another type"
 NO_WHOLE_NUMBER: Final = "which is no whole number"
-NO_OBJECT: Final = "a list instead of an object"
 _NOT_ASCII: Final = "which is none of its values, and beyond ASCII"
 _BOUNDS: Final = ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum")
 _BEYOND: Final = frozenset({"beyond its maximum", "at its exclusiveMaximum"})
@@ -62,9 +65,9 @@ def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variatio
     not_utf8 = replace(usual, body=b'{"roaas": "\xff\xfe"}')
     yield Variation(Kind.MALFORMED, "a body that is not UTF-8", "body", not_utf8)
     if "object" in kinds_of(body.schema) and len(kinds_of(body.schema)) == 1:
-        yield Variation(Kind.INVALID, NO_OBJECT, "body", replace(usual, body=[]))
+        yield Variation(Kind.INVALID, _LIST, "body", replace(usual, body=[]))
         nested = replace(usual, body=b"[" * _NESTED + b"]" * _NESTED)
-        yield Variation(Kind.INVALID, f"{_NESTED:,} lists in each other", "body", nested)
+        yield Variation(Kind.INVALID, _LISTS, "body", nested)
     # A value that one alternative of a union forbids may be allowed by another alternative.
     found = _invalid_parts(usual, usual.body, body.schema, ())
     # A merge patch leaves out what it does not change (RFC 7396).

@@ -30,6 +30,8 @@ Steps = tuple[str | int, ...]
 UNKNOWN: Final = "roaas-unknown"
 #: The place of a variation that has other formats.
 ACCEPT: Final = "header Accept"
+#: The end of what a variation says whose text has as many characters as its bound, and more UTF-16 units.
+WIDE: Final = " characters, some beyond U+FFFF"
 #: A media type that no device has.
 NO_FORMAT: Final = "application/x.roaas-nothing"
 _UNKNOWN_NUMBER: Final = 987_654_321
@@ -96,6 +98,9 @@ def valid_variations(operation: Operation, usual: Inputs, values: Values) -> Ite
     for item in operation.parameters:
         place = f"{item.where} {item.name}"
         for kind, value in _valid_values(item.schema, item.examples, values.of(operation, item), item.required):
+            # A path parameter is never left out, so a default says nothing of it.
+            if kind is Kind.DEFAULT and item.where == "path":
+                continue
             is_new = value != usual.at(item.where).get(item.name, NOTHING) and _sendable(item, value)
             if is_new and parameter_verdict(operation, item, value) == VALID:
                 yield Variation(kind, f"{clip(value)} as {place}", place, usual.having(item.where, item.name, value))
@@ -261,12 +266,14 @@ def _valid_members(usual: Inputs, value: Any, schema: Schema, steps: tuple[str, 
             filled = replace(usual, body=with_member(usual.body, here, inner))
             yield Variation(Kind.OPTIONAL, f"the optional member {place}", place, filled)
         for kind, one in _valid_values(flatter, flatter.get("examples", ()) or (), [], required=True):
-            if kind is Kind.BOUND and plain_name(name) in _TEXTUAL and isinstance(one, str) and len(one) > 1:
+            wide = kind is Kind.BOUND and plain_name(name) in _TEXTUAL and isinstance(one, str) and len(one) > 1
+            if wide:
                 # JSON Schema counts characters, not bytes or UTF-16 units (JSON Schema Validation 6.3).
                 one = ("\u00e9\U0001f916" * len(one))[: len(one)]  # noqa: PLW2901 - of the same length
             if one != value.get(name, NOTHING):
                 body = with_member(usual.body, here, one)
-                yield Variation(kind, f"{clip(one)} as {place}", place, replace(usual, body=body))
+                says = f"{clip(one)} as {place}{f', {len(one)}{WIDE}' if wide else ''}"
+                yield Variation(kind, says, place, replace(usual, body=body))
         if isinstance(inner, dict) and len(steps) < DEPTH:
             yield from _valid_members(filled, inner, part, here)
 

@@ -14,7 +14,7 @@ from conformance.api.rest.invalid_variations import NO_OBJECT, NO_WHOLE_NUMBER
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.statuses import HELD
 from conformance.api.rest.validity import INVALID, VALID
-from conformance.api.rest.variations import ACCEPT, Kind
+from conformance.api.rest.variations import ACCEPT, WIDE, Kind
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, operations_of
 from conformance.documents.writing import json_text
@@ -30,6 +30,7 @@ _INVALID = frozenset({400, 422})
 # Doubt about a refusal of what the description allows.
 _FIT = "the values of a request may have to fit each other, or what the device does at the moment"
 _PARSER = "a JSON parser may accept more than JSON (RFC 8259 9), as those of Node.js and Go do"
+_TWICE = "programs in JavaScript, Java and C# count a character beyond U+FFFF twice"
 _UNSAID = "many frameworks demand a body and leave out `required: true` in their descriptions"
 # Methods whose requests' content has no meaning (RFC 9110 9.3.1, 9.3.2, 9.3.5).
 _WITHOUT_CONTENT = frozenset({"GET", "HEAD", "DELETE"})
@@ -83,7 +84,7 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
         # If a framework converts a type, it does so in every operation.
         converted = _CONVERTED.search(why)
         given = _json_type((converted[1] or converted[3]).lower()) if converted else ""
-        if _place_of(probe) == "body" and (converted or probe.says == NO_OBJECT):
+        if _place_of(probe) == "body" and (converted or probe.says in NO_OBJECT):
             cause = "a body of another type"
         elif given == "boolean":
             cause = "a boolean converted"
@@ -375,6 +376,8 @@ def _judge_accepted(
     def fault(probe: Probe) -> Fault | None:
         if probe.status not in _REFUSED:
             return None
+        if probe.says.endswith(WIDE):
+            return Fault("characters counted twice", _refusal(probe.exchange), doubt=_TWICE)
         doubt = "" if probe.kind in sure or _is_alone(probe) else _FIT
         return Fault(f"{probe.operation} {without_numbers(probe.place)}", _refusal(probe.exchange), doubt=doubt)
 

@@ -7,7 +7,8 @@ import pytest
 from small_device import contract_of, object_of
 
 from conformance.api.rest.conversions import is_converted
-from conformance.api.rest.variations import Kind
+from conformance.api.rest.invalid_variations import NO_OBJECT
+from conformance.api.rest.variations import WIDE, Kind
 from conformance.documents.json_shape import shape_of
 from conformance.rules.description import test_answers as answers
 from conformance.rules.description import test_requests as requests
@@ -353,14 +354,23 @@ def test_a_json_parser_may_replace_octets_that_are_no_utf_8(sent, is_doubtful, r
 def test_a_body_of_another_type_is_told_once_of_all_operations(run):
     generated = {"kind": Kind.GENERATED, "validity": "invalid"}
     probes = [
-        _probe(operation=_OTHER, kind=Kind.INVALID, says="a list instead of an object", place="body", sent=b"[]"),
+        *[_probe(operation=_OTHER, kind=Kind.INVALID, says=one, place="body", sent=b"[]") for one in NO_OBJECT],
         *[
             _probe(operation="PUT /b", why=f"the value is {one}, not of type object", sent=one.encode(), **generated)
             for one in ("[]", "0", "false", '"A"')
         ],
     ]
     (finding,) = _failed(requests.invalid_refused, Survey(tuple(probes)), run)
-    assert {one.operation: one.seen for one in finding.operations} == {_OTHER: 1, "PUT /b": 4}
+    assert {one.operation: one.seen for one in finding.operations} == {_OTHER: 2, "PUT /b": 4}
+
+
+def test_characters_that_a_program_counts_twice_are_told_once(run):
+    operations = {_OTHER, "PUT /b"}
+    probes = [_probe(201, b"", operation=one, sent=b'{"n": 1}') for one in operations]
+    probes += [_probe(400, {}, Kind.BOUND, operation=one, says=f"32{WIDE}", place="body /n") for one in operations]
+    (finding,) = _failed(requests.valid_accepted, Survey(tuple(probes)), run)
+    assert {one.operation for one in finding.operations} == operations
+    assert "count a character beyond U+FFFF twice" in finding.doubt
 
 
 def test_a_wrong_parameter_is_named_as_the_survey_names_it(run):

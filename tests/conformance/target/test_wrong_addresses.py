@@ -156,6 +156,8 @@ def test_a_description_that_is_found_elsewhere_is_said(tmp_path):
         ("", "/api-docs/openapi.json"),  # utoipa
         ("", "/openapi/openapi.json"),  # flask-openapi3
         ("", "/api-docs.json"),  # swagger-jsdoc
+        ("", "/openapi/json"),  # Elysia
+        ("", "/swagger/json"),
         ("", "/api-docs/swagger-ui-init.js"),  # swagger-ui-express, which has no other document
         ("/anywhere/", "/anywhere/swagger-ui-init.js"),
         ("/robot7", "/robot7/openapi.json"),  # behind a prefix

@@ -101,6 +101,13 @@ def test_valid_variations_fit():
     }
 
 
+def test_the_default_of_a_path_parameter_is_not_tried():
+    ways = [{"type": "string", "format": "integer", "default": 0}, {"type": "integer"}]
+    item = _item("id", {"anyOf": ways, "example": 3}, "path")
+    usual = usual_inputs(operation := _operation(parameters=[item]), Values())[0]
+    assert Kind.DEFAULT not in {one.kind for one in valid_variations(operation, usual, Values())}
+
+
 def test_members_are_tried_together_and_each_of_their_values_once():
     usual = usual_inputs(_MANY, Values())[0]
     found = list(valid_variations(_MANY, usual, Values()))
