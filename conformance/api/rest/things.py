@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple, TypeGuard
 
 from conformance.api.rest.references import is_free_text, refers, singular
 from conformance.api.rest.samples import FORMATS, alike_and_apart, entry_of, fits, sample
+from conformance.api.rest.unique import with_number
 from conformance.api.rest.values import IDS
 from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.json_text import clip
@@ -131,11 +132,17 @@ def may_create(create: Operation, status: int) -> bool:
 
 
 def path_chosen(item: Operation, turn: int) -> str:
-    """Return the path of a thing with an identifier that the client chooses, another one each turn; else empty."""
+    """Return the path of a thing with an identifier that the client chooses, another one each turn; else empty.
+
+    Where the schema allows none of the suite's own, it is made like an example or sample, such as `AB0001`.
+    """
     if len(item.parameter("path")) != 1:
         return ""
     (parameter,) = item.parameter("path")
     candidates: list[Any] = [one.format(turn) for one in _CHOSEN] + [_CHOSEN_NUMBER + turn]
+    for like in (*parameter.examples, sample(parameter.schema)):
+        made = with_number(parameter.schema, like, _CHOSEN_NUMBER + turn)
+        candidates += [made] if made != like else []
     id_ = next((candidate for candidate in candidates if fits(parameter.schema, candidate)), None)
     return "" if id_ is None else item.template.replace(f"{{{parameter.name}}}", str(id_))
 

@@ -1,8 +1,11 @@
 """What differs between what was written and what is read."""
 
+import re
+
 import pytest
 
-from conformance.api.rest.things import differences, with_items
+from conformance.api.rest.things import differences, path_chosen, with_items
+from conformance.documents.openapi import read_operations
 
 _SCHEMA = {
     "type": "object",
@@ -58,3 +61,21 @@ def test_whole_items_have_optional_members_and_are_many_where_the_schema_says_ho
     made = with_items(schema, {"steps": [{"a": 1}]}, 1, frozenset(), whole=True)["steps"]
     assert len(made) == count
     assert {one["b"] for one in made} == {True, False}
+
+
+@pytest.mark.parametrize(
+    ("schema", "given", "form"),
+    [
+        ({"type": "string"}, {}, r"/parcels/roaas-7"),
+        ({"type": "string", "pattern": "^[A-Z]{2}[0-9]{4}$"}, {}, r"/parcels/[A-Z]{2}\d{4}"),
+        ({"type": "string", "pattern": "^[a-z]+$", "maxLength": 4}, {"example": "abcd"}, r"/parcels/(?!abcd)[a-z]{4}"),
+        ({"type": "integer", "maximum": 5000}, {}, r"/parcels/\d{1,4}"),
+        ({"type": "string", "enum": ["left", "right"]}, {}, ""),
+    ],
+)
+def test_a_client_chooses_identifiers_that_the_schema_allows(schema, given, form):
+    parameter = {"name": "code", "in": "path", "required": True, "schema": schema, **given}
+    paths = {"/parcels/{code}": {"get": {"parameters": [parameter], "responses": {"200": {"description": "x"}}}}}
+    (read,) = read_operations({"openapi": "3.1.0", "info": {"title": "t", "version": "1"}, "paths": paths})
+    assert re.fullmatch(form, path_chosen(read, 7))
+    assert path_chosen(read, 7) != path_chosen(read, 8) or not form
