@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -53,6 +53,7 @@ class _Part:
         page: what it shows.
         names: the parameters of its request.
         offset: how many items are before it.
+        told: the totals that count the filtered items, by the description.
         whole: whether it goes to the end.
         sure: whether it does so for certain: no server has cut it at a bound of its own.
     """
@@ -61,6 +62,7 @@ class _Part:
     page: Page
     names: frozenset[str]
     offset: int
+    told: Collection[str]
     whole: bool
     sure: bool
 
@@ -167,14 +169,15 @@ class Totals:
         is_beyond = shown == 0 and offset > 0
         whole = not page.goes_on and (shown < most or (is_open and not most)) and not is_beyond
         sure = whole and not self._is_cut(listing, shown)
-        part = _Part(occasion, page, frozenset(sent), offset, whole=whole, sure=sure)
+        told = says_filtered(listing)
+        part = _Part(occasion, page, frozenset(sent), offset, told, whole=whole, sure=sure)
         for name, total in page.totals.items():
             yield from self._of_all_pages(listing, part, name, chosen, total)
             every = self._counts[label, name, frozenset()]
             count = self._counts[label, name, chosen] if len(self._counts) < _MOST else every
             every.is_of_all |= total > shown > 0
             count.is_of_all |= every.is_of_all
-            if chosen and whole and count.agrees is None and name in says_filtered(listing):
+            if chosen and whole and count.agrees is None and name in told:
                 count.agrees = True
             # A filter that keeps all items does not show whether the total counts the filtered ones.
             if whole and shown and (not chosen or part.least < every.all):
@@ -225,7 +228,7 @@ class Totals:
             # size.
             elif plain_name(name) in TOTALS and total == shown < count.all and count.all_s > self._changed_s:
                 count.sizes.add(total)
-                if len(count.sizes) >= _OFTEN:
+                if len(count.sizes) >= _OFTEN or name in part.told:
                     expected = f"{count.all} as {name}, as the whole list tells"
                     yield _case(part.occasion, name, f"{total} as {name}", expected, holds=False)
 

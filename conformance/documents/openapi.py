@@ -330,8 +330,12 @@ def _names_marked(properties: dict[str, Any], mark: str) -> set[str]:
 
 
 def _headers(response: dict[str, Any]) -> dict[str, tuple[bool, Schema]]:
+    """Return the header fields of a response; a schema without a description has the field's."""
     return {
-        name.lower(): (bool(header.get("required", False)), modern(header.get("schema", {})))
+        name.lower(): (
+            bool(header.get("required", False)),
+            {key: header[key] for key in ("description",) if key in header} | modern(header.get("schema", {})),
+        )
         for name, header in response.get("headers", {}).items()
         # OpenAPI 3.1, 4.8.17.1: a Content-Type header in this place is ignored.
         if name.lower() != "content-type"

@@ -36,7 +36,8 @@ _NO_ITEMS: Final = frozenset({"errors", "warnings", "links", "included", "facets
 #: instead.
 TOTALS: Final = frozenset(
     {"total", "totalcount", "totalitems", "totalelements", "totalresults", "totalrecords", "totalsize", "totalrows",
-     "totalhits", "odatacount", "hydratotalitems", "numfound", "nbhits", "recordsfiltered"}
+     "totalhits", "odatacount", "hydratotalitems", "numfound", "nbhits", "recordsfiltered",
+     "xtotalcount", "xtotal", "xpaginationtotal", "xwptotal"}
 )  # fmt: skip
 _HEADERS: Final = ("x-total-count", "x-total", "total-count", "x-pagination-total", "x-wp-total")
 COUNTS: Final = frozenset({"count", "itemcount", "itemscount", "recordcount", "numitems", "length"})
@@ -149,8 +150,9 @@ class Listing:
 
     @cached_property
     def says(self) -> dict[str, str]:
-        """Return the description's texts on the members around the list, by name."""
-        parts = flat(self.operation.shape or {}).get("properties", {})
+        """Return the description's texts on the members around the list and its header fields, by name."""
+        parts = dict(flat(self.operation.shape or {}).get("properties", {}))
+        parts |= {name: schema for name, (_, schema) in self.operation.headers.get("200", {}).items()}
         found = {name: flat(one).get("description") for name, one in parts.items() if isinstance(one, dict)}
         return {name: text for name, text in found.items() if isinstance(text, str)}
 

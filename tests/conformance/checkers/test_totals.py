@@ -97,6 +97,14 @@ def test_a_total_that_is_the_size_of_the_page_is_noticed(query, tmp_path):
     assert seen.read(of[:2], limit=2, **query).broken == {TOTAL}
 
 
+def test_a_header_that_counts_all_matches_by_its_description_is_no_size_of_a_page(tmp_path):
+    for field, expected in (({"description": "How many valves match the filters."}, {TOTAL}), ({}, set())):
+        headers = {"X-Total-Count": {"schema": {"type": "integer"}, **field}}
+        seen = Seen(tmp_path / str(len(field)), [whole("limit")], headers=headers)
+        seen.read(VALVES, [("X-Total-Count", "4")]).read(VALVES[:1], [("X-Total-Count", "1")], limit=1)
+        assert seen.broken == expected
+
+
 def test_a_list_that_grows_and_shrinks_by_itself_has_another_total(tmp_path):
     seen = Seen(tmp_path, [whole("limit", default=3)], _totalled("total"))
     for count in (2, 3, 3, 2, 3, 3):

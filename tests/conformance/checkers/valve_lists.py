@@ -65,8 +65,12 @@ _JUDGED = ("description/list-", "description/invalid-")
 class Seen:
     """The requirements that are not met in a run of exchanges with one list."""
 
-    def __init__(self, tmp_path, parameters, wrapped=lambda items: items, says=""):
-        get = {"responses": {"200": answers(_of(wrapped([])))}, "parameters": list(parameters), "summary": says}
+    def __init__(self, tmp_path, parameters, wrapped=lambda items: items, says="", headers=None):
+        get = {
+            "responses": {"200": {**answers(_of(wrapped([]))), "headers": headers or {}}},
+            "parameters": list(parameters),
+            "summary": says,
+        }
         document = described(
             {"/valves": {"get": get, "post": {"responses": {"201": {"description": "made"}}}}}, "3.1.0"
         )
