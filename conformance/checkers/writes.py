@@ -238,7 +238,9 @@ class Writes:
             changed = [name for name in names if not same(now.get(name), state.members.get(name))]
             self._moving |= {(item.template, name) for name in changed if not writes}
             refused = [one for one in writes if refuses(one.response.status, one.operation)]
-            for one in refused if len(writes) > 1 and len(refused) == len(writes) else ():
+            # Of several with one body, the reads do not tell which one has taken effect.
+            alone = [one for one in refused if [each.request.body for each in writes].count(one.request.body) == 1]
+            for one in alone if len(writes) > 1 and len(refused) == len(writes) else ():
                 yield from self._judge_write(
                     occasion, item, one, _Sandwich(state.members, now, frozenset(), is_old=True)
                 )

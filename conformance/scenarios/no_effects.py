@@ -1,4 +1,4 @@
-"""Find values that a request changes although it must not: a safe one, or one that is refused for its credentials.
+"""Find values that a request changes although it must not: a safe one, or one that is refused for its header fields.
 
 Such a value is a lamp that the GET of something else switches. In one arm of the experiment the suite waits and then
 reads a value, in the other it sends the request before that read. Both arms may begin with a request that acts, so that
@@ -75,18 +75,29 @@ _SAYS: Final = re.compile(
     r"\b(?:acknowledg|clear|consum|de-?queue|drain|empt(?:y|ies)|flush|mark|once|pop|refresh|remov|reset|since the)",
     re.IGNORECASE,
 )
-_REFUSED: Final = frozenset({401, 403})
+# How a write differs from one that is accepted, and the statuses that refuse it for that.
+_ANONYMOUS: Final = "without credentials"
+_AS_TEXT: Final = "as text/plain"
+_REFUSED: Final = {_ANONYMOUS: frozenset({401, 403}), _AS_TEXT: frozenset({415})}
+# Number of the write whose values no other check sends.
+_TURN: Final = 70
 _THERE: Final = ""  # the place whose value is whether the resource exists
 _Places = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class _Try:
-    """A request that must change nothing; one that is not authorized has no credentials, and must be refused."""
+    """A request that must change nothing.
+
+    Attributes:
+        operation: of the description.
+        requests: with other values in turn, so that each would change something.
+        how: how it differs from one that is accepted, for which it must be refused; empty for a safe one.
+    """
 
     operation: Operation
-    request: Outgoing
-    authorized: bool = True
+    requests: tuple[Outgoing, ...]
+    how: str = ""
 
 
 @dataclass(frozen=True)
@@ -174,7 +185,7 @@ class _Experiment:
         reads = [one for (method, _), one in self._operations.items() if method == "GET"]
         for read in sorted(reads, key=lambda one: bool(one.parameter("path"))):
             request = self._request(read)
-            found = self._attempt(_Try(read, request)) if len(self._watched) < _WATCHED[self._effort] else None
+            found = self._attempt(_Try(read, (request,))) if len(self._watched) < _WATCHED[self._effort] else None
             if found is not None and read.label not in self._long and _values(found):
                 self._watched.append((read, request))
 
@@ -211,23 +222,35 @@ class _Experiment:
         return _values(exchange), exchange
 
     def _tries(self) -> Iterator[_Try]:
-        """Yield each GET, each GET of a thing that does not exist, HEAD and OPTIONS, and writes without credentials."""
+        """Yield each GET, each GET of a thing that does not exist, HEAD and OPTIONS, and writes to be refused."""
         gets = (one for (method, _), one in self._operations.items() if method == "GET")
         reads = [one for one in gets if one.label not in self._long]
         for read in reads:
-            yield _Try(read, self._request(read))
+            yield _Try(read, (self._request(read),))
             usual = usual_inputs(read, self.writer.values)[0]
             for unknown in islice(unknown_variations(read, usual), 1):
-                yield _Try(read, request_of(read, unknown.inputs))
+                yield _Try(read, (request_of(read, unknown.inputs),))
         for read in reads:
             for method in ("HEAD", "OPTIONS"):
-                yield _Try(read, replace(self._request(read), method=method))
+                yield _Try(read, (replace(self._request(read), method=method),))
         description = self.writer.api.run.contract.openapi
         for operation in self._operations.values():
-            template, is_closed = operation.template.rstrip("/"), demands(description, operation)
+            template = operation.template.rstrip("/")
             own = any(f"{template}/".startswith(f"{one}/") for one in self._made)
-            if is_closed and not operation.safe and is_free(operation, template) and (own or "{" not in template):
-                yield _Try(operation, self._request(operation), authorized=False)
+            if operation.safe or not is_free(operation, template) or not (own or "{" not in template):
+                continue
+            requests = self._writes(operation)
+            if demands(description, operation):
+                yield _Try(operation, requests, _ANONYMOUS)
+            # A POST that is taken as text would create things.
+            if len(requests) > 1 and all(map(is_json, operation.bodies)):
+                yield _Try(operation, tuple(one.having_type("text/plain") for one in requests), _AS_TEXT)
+
+    def _writes(self, operation: Operation) -> tuple[Outgoing, ...]:
+        """Return the usual request of an operation; for PUT and PATCH one with other values, and then that."""
+        bodies = self.writer.bodies(operation, _TURN)[:2] if operation.method in {"PUT", "PATCH"} else []
+        made = (self._to_own(operation, self.writer.request(operation, body=body)) for body in bodies)
+        return tuple(made) or (self._request(operation),)
 
     def _suspects(self, act: Outgoing | None, *, in_full: bool) -> Iterator[_Suspect]:
         """Yield what differs between reads that no request but safe ones separates; the order of the reads varies.
@@ -245,7 +268,7 @@ class _Experiment:
         back = {number: self._read(number)[0] for number in reversed(numbers)}
         known = {request for _, request in self._watched}
         for one in self._tries():
-            if (in_full or one.request.method == "GET") and one.request not in known:
+            if (in_full or one.requests[0].method == "GET") and one.requests[0] not in known:
                 self._attempt(one)
         for number in numbers:
             first, second = pairs[number]
@@ -253,18 +276,19 @@ class _Experiment:
             for before, after in ((first, second), (third, last), (first, third), (second, last)):
                 yield from (_Suspect(number, place, act) for place in _changes(before, after, grown=in_full))
 
-    def _attempt(self, one: _Try) -> Exchange | None:
+    def _attempt(self, one: _Try, turn: int = 0) -> Exchange | None:
         """Send a request that must change nothing; return None if it could not be sent, or was not refused."""
-        request = one.request
+        request = one.requests[turn % len(one.requests)]
         with suppress(NotPermittedError):
-            if one.authorized:
+            if not one.how:
                 exchange = self._send(request)
                 is_long = exchange.response.elapsed_ms > _LONG_MS and self._effort != "slow"
                 self._long |= {one.operation.label} if is_long else set()
                 return exchange
-            options: dict[str, Any] = {"headers": request.headers, "body": request.body, "authorized": False}
+            options: dict[str, Any] = {"headers": request.headers, "body": request.body}
+            options["authorized"] = one.how != _ANONYMOUS
             sent = self.writer.api.client.send(request.method, request.target, fresh=True, **options)
-            return sent if sent.response.status in _REFUSED else None
+            return sent if sent.response.status in _REFUSED[one.how] else None
         return None
 
     def _perform(self, act: Outgoing | None) -> bool:
@@ -282,7 +306,7 @@ class _Experiment:
             return None if one.act is not None else self._alternates(one)
         guilty, is_innocent = None, False
         for tried in self._tries():
-            if not (tried.authorized and _SAYS.search(tried.operation.text)):
+            if tried.how or not _SAYS.search(tried.operation.text):
                 shown = self._effect(one, tried, seen[0])
                 is_innocent = is_innocent or shown is None
                 guilty = guilty or (shown and (tried, *shown))
@@ -291,14 +315,14 @@ class _Experiment:
         if not guilty or not is_innocent:
             return None
         tried, exchange, value = guilty
-        request = f"{tried.request.method} {tried.request.target}" + " without credentials" * (not tried.authorized)
+        request = f"{tried.requests[0].method} {tried.requests[0].target} {tried.how}".rstrip()
         read = self._watched[one.number][0]
         act = f", sent after {one.act.method} {one.act.target}" if one.act is not None else ""
         expected = f"{_place_name(one.place, read)} to stay {clip(seen[0])} after {request}{act}"
         fault = f"{clip(value)}, {_ROUNDS} of {_ROUNDS} times, and never when it was not sent"
-        return Watched(read.label, exchange, expected, fault, is_safe=tried.authorized)
+        return Watched(read.label, exchange, expected, fault, is_safe=not tried.how)
 
-    def _arm(self, one: _Suspect, tried: _Try | None, wait_s: float) -> tuple[Any, Any, Exchange | None]:
+    def _arm(self, one: _Suspect, tried: _Try | None, wait_s: float, turn: int = 0) -> tuple[Any, Any, Exchange | None]:
         """Act, wait, and send a request that must change nothing, or none.
 
         Returns:
@@ -307,16 +331,17 @@ class _Experiment:
         before = None if one.act is not None else self._read(one.number)[0].get(one.place)
         self._perform(one.act)
         time.sleep(wait_s)
-        sent = self._attempt(tried) if tried is not None else None
+        sent = self._attempt(tried, turn) if tried is not None else None
         return before, self._read(one.number)[0].get(one.place), sent
 
     def _effect(self, one: _Suspect, tried: _Try, usual: Any) -> tuple[Exchange, Any] | None:
         """Return a request's exchange and the value after it, if that changes each time, and never without it."""
         sent, value = None, None
-        for turn in range(_ROUNDS):
-            before, value, sent = self._arm(one, tried, _WAITS_S[turn % 2])
+        # The search for suspects has sent the first of a write's values.
+        for turn in range(1, _ROUNDS + 1):
+            before, value, sent = self._arm(one, tried, _WAITS_S[turn % 2], turn)
             was = usual if one.act is not None else before
-            if sent is None or not _counts(one.place, was, value, grown=not tried.authorized):
+            if sent is None or not _counts(one.place, was, value, grown=bool(tried.how)):
                 return None
             # Without the request, the wait is as long as with it.
             before, alone, _ = self._arm(one, None, _WAITS_S[turn % 2] + sent.response.elapsed_ms / 1000)
