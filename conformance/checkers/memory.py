@@ -590,4 +590,5 @@ def _body_of(occasion: Occasion, operation: Operation) -> dict[str, Any] | None:
     is_first, value = occasion.request.media_type == next(iter(operation.bodies), None), _sent_of(occasion)
     if not (is_first and value and occasion.is_valid):
         return None
-    return as_answered(value, occasion.members(value), {}, operation.bodies[occasion.request.media_type].schema)
+    schema = operation.bodies[occasion.request.media_type].schema
+    return as_answered(value, occasion.members(value), {}, schema, operation.text)

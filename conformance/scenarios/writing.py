@@ -236,7 +236,8 @@ class Writer:
         schema = operation.bodies[media_type].schema
         if not isinstance(body, dict):
             body, schema = {WHOLE: body}, {"properties": {WHOLE: schema}}
-        told = as_answered(body, members(sent, body), members(before, body) if before else {}, schema)
+        was = members(before, body) if before else {}
+        told = as_answered(body, members(sent, body), was, schema, operation.text)
         now, collections = members(found, body), self.values.collections
         differs = tuple(differences(body, now, schema, read.shape, collections))
         return differs if any(differences(told, now, schema, read.shape, collections)) else ()

@@ -36,8 +36,7 @@ _NO_ITEMS: Final = frozenset({"errors", "warnings", "links", "included", "facets
 #: instead.
 TOTALS: Final = frozenset(
     {"total", "totalcount", "totalitems", "totalelements", "totalresults", "totalrecords", "totalsize", "totalrows",
-     "totalhits", "odatacount", "hydratotalitems", "numfound", "nbhits", "recordsfiltered",
-     "xtotalcount", "xtotal", "xpaginationtotal", "xwptotal"}
+     "totalhits", "odatacount", "hydratotalitems", "numfound", "nbhits", "recordsfiltered", "xtotalcount", "xtotal"}
 )  # fmt: skip
 _HEADERS: Final = ("x-total-count", "x-total", "total-count", "x-pagination-total", "x-wp-total")
 COUNTS: Final = frozenset({"count", "itemcount", "itemscount", "recordcount", "numitems", "length"})
@@ -151,10 +150,9 @@ class Listing:
     @cached_property
     def says(self) -> dict[str, str]:
         """Return the description's texts on the members around the list and its header fields, by name."""
-        parts = dict(flat(self.operation.shape or {}).get("properties", {}))
-        parts |= {name: schema for name, (_, schema) in self.operation.headers.get("200", {}).items()}
-        found = {name: flat(one).get("description") for name, one in parts.items() if isinstance(one, dict)}
-        return {name: text for name, text in found.items() if isinstance(text, str)}
+        around = [(name, schema) for name, (_, schema) in self.operation.headers.get("200", {}).items()]
+        around += flat(self.operation.shape or {}).get("properties", {}).items()
+        return {name: str(flat(one).get("description", "")) for name, one in around if isinstance(one, dict)}
 
     @cached_property
     def known_names(self) -> frozenset[str]:

@@ -50,6 +50,12 @@ _EXACTLY: Final = re.compile(
     r"|(?:not|never) rounded|(?:full|double) precision)\b",
     re.IGNORECASE,
 )
+# The same, of an operation.
+_PROMISED: Final = re.compile(
+    r"\b(?:return|read|show|give|store|keep|kept)\w*\b[^.;]{0,30}\b(?:unchanged|verbatim|as (?:it|they) (?:was|were)"
+    r"|(?:exactly )?as (?:sent|written|given))\b",
+    re.IGNORECASE,
+)
 # Words of a description: for a DELETE after which nothing is there, for one that ends or hides a thing, and for things
 # that end by themselves.
 _REMOVES: Final = re.compile(r"\b(?:delet|remov|eras|destroy|discard|purg|unregister)", re.IGNORECASE)
@@ -365,18 +371,23 @@ def members_in(schema: Schema, names: Collection[str]) -> dict[str, Any]:
     return flat(schema).get("properties", {}) if entry is None else dict.fromkeys(names, entry)
 
 
-def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, Any], schema: Schema) -> dict[str, Any]:
+def as_answered(
+    sent: dict[str, Any], answer: dict[str, Any], before: dict[str, Any], schema: Schema, says: str
+) -> dict[str, Any]:
     """Return the values that were written, or those that the response shows in their place.
 
-    A device that tells which other value it took has written that, but for the one that was there before, and for
-    another value of an enumeration, or of the two of a boolean.
+    A device that tells which other value it took has written that, but for the one that was there before, for another
+    value of an enumeration, or of the two of a boolean, and where its description promises what was sent.
 
     Args:
         sent: the members that were sent.
         answer: those in the response.
         before: those that were read before; empty if nobody read them, or nothing was there.
         schema: the schema of what was sent.
+        says: the description's words on the write.
     """
+    if _PROMISED.search(says):
+        return sent
     parts = flat(schema).get("properties", {})
     told = {
         name: answer[name]

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from conformance.api.rest.things import differences, path_chosen, with_items
+from conformance.api.rest.things import as_answered, differences, path_chosen, with_items
 from conformance.documents.openapi import read_operations
 
 _SCHEMA = {
@@ -79,3 +79,18 @@ def test_a_client_chooses_identifiers_that_the_schema_allows(schema, given, form
     (read,) = read_operations({"openapi": "3.1.0", "info": {"title": "t", "version": "1"}, "paths": paths})
     assert re.fullmatch(form, path_chosen(read, 7))
     assert path_chosen(read, 7) != path_chosen(read, 8) or not form
+
+
+@pytest.mark.parametrize(
+    ("says", "taken"),
+    [
+        ("Replaces all settings. GET then returns them unchanged.", 0),
+        ("Stores the value exactly as sent.", 0),
+        ("Replaces all settings.", 50),
+        ("Members that are left out stay unchanged.", 50),
+        ("Returns the settings. What was left out is unchanged.", 50),
+    ],
+)
+def test_a_device_that_promises_what_was_sent_takes_no_other_value(says, taken):
+    schema = {"properties": {"brightness": {"type": "integer"}}}
+    assert as_answered({"brightness": 0}, {"brightness": 50}, {"brightness": 40}, schema, says) == {"brightness": taken}
