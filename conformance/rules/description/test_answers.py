@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from conformance.api.rest.statuses import ANY_TIME, CRASHES
+from conformance.api.rest.validity import INVALID
 from conformance.api.rest.variations import Kind
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_shape import shape_of, wrong_formats
@@ -57,10 +58,15 @@ def _judgeable(trace: Survey, run: Run) -> Iterator[tuple[Probe, Operation, Resp
 
 
 def _by_server(probe: Probe, answer: Response, operation: Operation) -> bool:
-    """Return whether a web server may have refused a request before the application saw it: strange, or too many."""
+    """Return whether a web server may have refused a request before the application saw it: strange, or too many.
+
+    A router that reads path parameters by their types, as those of Flask and ASP.NET do, finds none for a wrong value.
+    """
     strange = probe.kind in {Kind.ODD, Kind.GENERATED, Kind.OTHER}
-    refuses = answer.status in {_BAD_REQUEST, _FORBIDDEN} and not is_json(answer.media_type)
-    return (strange and refuses) or (answer.put_off_s is not None and str(answer.status) not in operation.responses)
+    is_routed = answer.status == _NOT_FOUND and operation.parameter("path") and (strange or probe.kind is Kind.INVALID)
+    refuses = (strange and answer.status in {_BAD_REQUEST, _FORBIDDEN}) or is_routed
+    refuses = refuses and not is_json(answer.media_type)
+    return bool(refuses) or (answer.put_off_s is not None and str(answer.status) not in operation.responses)
 
 
 def _in_question(probe: Probe, status: int) -> bool:
@@ -175,7 +181,11 @@ def _matches(declared: str, given: str) -> bool:
 @rule("description/body-schema", on=_ON)
 def body_schema(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether each JSON body is valid by the schema that is declared for its status, errors included."""
-    judged = {id(probe): (answer.status, wrong) for probe, (_, answer), wrong in _with_fault(trace, run)}
+    judged = {
+        id(probe): (answer.status, wrong)
+        for probe, (_, answer), wrong in _with_fault(trace, run)
+        if not (wrong and _is_echo(probe))
+    }
 
     def fault(probe: Probe) -> Fault | None:
         status, wrong = judged[id(probe)]
@@ -185,6 +195,12 @@ def body_schema(trace: Survey, run: Run) -> Iterable[Outcome]:
     yield from told_once(
         (one for one in trace.probes if id(one) in judged), "JSON that is valid by the declared schema", fault
     )
+
+
+def _is_echo(probe: Probe) -> bool:
+    """Return whether the device accepted a wrong body, which its response repeats: invalid_refused tells that."""
+    is_wrong = probe.kind is Kind.INVALID or (probe.kind is Kind.GENERATED and probe.validity == INVALID)
+    return probe.ok and is_wrong and probe.attempt.request.body != b""
 
 
 @rule("description/formats", on=_ON)

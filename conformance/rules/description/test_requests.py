@@ -6,6 +6,7 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from http import HTTPStatus
 from typing import Any
 from urllib.parse import parse_qsl, unquote, urlsplit
 
@@ -35,6 +36,8 @@ _UNSAID = "many frameworks demand a body and leave out `required: true` in their
 # Methods whose requests' content has no meaning (RFC 9110 9.3.1, 9.3.2, 9.3.5).
 _WITHOUT_CONTENT = frozenset({"GET", "HEAD", "DELETE"})
 _WRONG = frozenset({Kind.INVALID, Kind.MALFORMED})
+# From so many accepted bodies on, of all that were sent, an operation checks none.
+_SEVERAL = 5
 # Header fields whose wrong values a server may ignore (RFC 9110 12.5, 13.1, 14.2; RFC 7240 2), whatever is declared.
 _OF_HTTP = frozenset(
     f"header {name}"
@@ -76,30 +79,49 @@ def operations(trace: Survey, run: Run) -> Iterable[Outcome]:
 def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether requests with values that the description forbids are refused, unless they are converted."""
     sure = _forbidden(trace)
+    converted = _convertible(trace, sure, run)
+    acted = [one for one in sure if one.status not in HELD and id(one) not in converted]
+    unchecked = _operations_without_checks(acted)
 
     def fault(probe: Probe) -> Fault | None:
         if not probe.ok:
             return None
-        why = "" if probe.says else probe.why
-        # If a framework converts a type, it does so in every operation.
-        converted = _CONVERTED.search(why)
-        given = _json_type((converted[1] or converted[3]).lower()) if converted else ""
-        if _place_of(probe) == "body" and (converted or probe.says in NO_OBJECT):
-            cause = "a body of another type"
-        elif given == "boolean":
-            cause = "a boolean converted"
-        elif probe.says.endswith(NO_WHOLE_NUMBER) and probe.place.startswith("body"):
-            cause = "a fraction converted"
-        elif converted and converted[2] and not probe.says:
-            cause = f"{given} {converted[2]}"
-        else:
-            cause = f"{probe.operation} {without_numbers(probe.place) if probe.says else _place_in(why)}"
-        return Fault(cause, f"status {probe.status}{_because(why)}", doubt=_doubt_of_content(probe))
+        why, doubt = "" if probe.says else probe.why, _doubt_of_content(probe)
+        is_whole = probe.operation in unchecked and _place_of(probe).startswith("body")
+        all_of = f" (as to each of {unchecked[probe.operation]} wrong bodies)" if is_whole else ""
+        cause = "octets that are no UTF-8" if doubt == _PARSER else "a body is not checked" if is_whole else ""
+        saw = f"status {probe.status}{all_of}{_because(why)}"
+        return Fault(cause or _cause_of_acceptance(probe, why), saw, doubt=doubt)
 
     yield from held_back(sure)
-    converted = _convertible(trace, sure, run)
-    acted = [one for one in sure if one.status not in HELD and id(one) not in converted]
     yield from told_once(acted, "status 4xx for a request that the description forbids", fault)
+
+
+def _operations_without_checks(acted: Iterable[Probe]) -> dict[str, int]:
+    """Return the operations that accepted each of several wrong JSON bodies, and how many these were."""
+    found = defaultdict[str, list[bool]](list)
+    for probe in acted:
+        if _place_of(probe).startswith("body") and probe.status < HTTPStatus.INTERNAL_SERVER_ERROR:
+            # Deep nesting and what is no JSON are refused by parsers, not by checks.
+            body = probe.attempt.request.body
+            if not body.startswith(b"[[[[") and not read_json(body).malformed:
+                found[probe.operation].append(probe.ok)
+    return {operation: len(each) for operation, each in found.items() if len(each) >= _SEVERAL and all(each)}
+
+
+def _cause_of_acceptance(probe: Probe, why: str) -> str:
+    """Return what accepted requests have in common: if a framework converts a type, it does so in every operation."""
+    converted = _CONVERTED.search(why)
+    given = _json_type((converted[1] or converted[3]).lower()) if converted else ""
+    if _place_of(probe) == "body" and (converted or probe.says in NO_OBJECT):
+        return "a body of another type"
+    if given == "boolean":
+        return "a boolean converted"
+    if probe.says.endswith(NO_WHOLE_NUMBER) and probe.place.startswith("body"):
+        return "a fraction converted"
+    if converted and converted[2] and not probe.says:
+        return f"{given} {converted[2]}"
+    return f"{probe.operation} {without_numbers(probe.place) if probe.says else _place_in(why)}"
 
 
 @rule("description/types", on=(survey, generated_requests))
@@ -208,8 +230,12 @@ def required(trace: Survey) -> Iterable[Outcome]:
     ]
     probes = [one for one in missing if one.exchange is not None]
 
+    in_body = Counter(one.operation for one in probes if one.ok and one.place.startswith("body /"))
+    demanded = {one.operation for one in probes if not one.ok and one.place.startswith("body /")}
+
     def fault(probe: Probe) -> Fault | None:
-        what = f"{probe.operation} {probe.place}"
+        is_whole = probe.place.startswith("body /") and in_body[probe.operation] > 1 and probe.operation not in demanded
+        what = f"{probe.operation} body" if is_whole else f"{probe.operation} {probe.place}"
         return Fault(what, f"status {probe.status}", doubt=_doubt_of_content(probe)) if probe.ok else None
 
     yield from held_back(probes)

@@ -41,7 +41,13 @@ def run(tmp_path_factory):
             },
             "put": {"requestBody": {"content": {"application/json": {"schema": _SCHEMA}}}, "responses": {}},
         },
-        "/c": {"get": {"responses": {"200": {"description": ""}}}},
+        "/c": {
+            "get": {"responses": {"200": {"description": ""}}},
+            "put": {
+                "requestBody": {"content": {"application/json": {"schema": _SCHEMA}}},
+                "responses": {"200": well, "400": _ERROR},
+            },
+        },
     }
     document = {"openapi": "3.1.0", "info": {"title": "t", "version": "1"}, "paths": paths}
     return Run(contract=contract_of(tmp_path_factory.mktemp("pack"), document))
@@ -371,6 +377,31 @@ def test_characters_that_a_program_counts_twice_are_told_once(run):
     (finding,) = _failed(requests.valid_accepted, Survey(tuple(probes)), run)
     assert {one.operation for one in finding.operations} == operations
     assert "count a character beyond U+FFFF twice" in finding.doubt
+
+
+@pytest.mark.parametrize(("kind", "seen"), [(Kind.INVALID, 0), (Kind.GENERATED, 0), (Kind.UNKNOWN, 1)])
+def test_a_router_that_reads_path_parameters_by_type_answers_404_in_its_own_format(kind, seen, run):
+    absent = _probe(404, b"<html>", kind, media_type="text/html", says="0.5 as path id", place="path id")
+    assert len(_failed(answers.media_type, Survey((absent,)), run)) == seen
+
+
+def test_what_a_device_accepts_and_repeats_is_told_by_one_rule(run):
+    wrong = [{"n": "a"}, {"n": []}, {"n": True}, {"n": 1.5}, []]
+    sent = {"kind": Kind.INVALID, "operation": "PUT /c", "place": "body /n"}
+    probes = [_probe(200, one, sent=json.dumps(one).encode(), says=f"{one} as body /n", **sent) for one in wrong]
+    (finding,) = _failed(requests.invalid_refused, Survey(tuple(probes)), run)
+    assert finding.observed.startswith("status 200 (as to each of 5 wrong bodies), for ")
+    assert not _failed(answers.body_schema, Survey(tuple(probes)), run)
+    apart = (*probes[1:], _probe(400, {}, sent=b'{"n": "a"}', says="a as body /n", **sent))
+    assert len(_failed(requests.invalid_refused, Survey(apart), run)) > 0
+    assert "each of" not in _failed(requests.invalid_refused, Survey(apart), run)[0].observed
+
+
+def test_members_of_which_none_is_demanded_are_told_once(run):
+    probes = [_probe(kind=Kind.MISSING, operation="PUT /c", says=one, place=f"body /{one}", sent=b"{}") for one in "ab"]
+    assert len(_failed(requests.required, Survey(tuple(probes)), run)) == 1
+    refused = _probe(400, {}, Kind.MISSING, operation="PUT /c", says="c", place="body /c", sent=b"{}")
+    assert len(_failed(requests.required, Survey((*probes, refused)), run)) == 2
 
 
 def test_a_wrong_parameter_is_named_as_the_survey_names_it(run):
