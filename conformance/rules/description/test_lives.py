@@ -138,7 +138,7 @@ def safe(trace: tuple[Watched, ...]) -> Iterable[Outcome]:
 
 @rule("description/refused-keeps", on=(no_effects,))
 def refused_without_effect(trace: tuple[Watched, ...]) -> Iterable[Outcome]:
-    """Judge whether requests that are refused for their credentials change nothing."""
+    """Judge whether requests that are refused for their credentials or media type change nothing."""
     for watch in (one for one in trace if not one.is_safe):
         yield Case(False, watch.shown, watch.expected, watch.fault, cause=watch.operation)
 
