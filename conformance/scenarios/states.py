@@ -182,11 +182,18 @@ class _Walker:
                 break
             self._look(shown)
         for _ in poll_for(self._clock, _PACE_S, _STAYS_S if taken else _KEEPS_S):
+            if taken and self._hurries(shown[-1]):
+                break
             self._look(shown)
         self.steps.append(Step(name, before, exchange, taken, tuple(shown), arrived or shown[-1] in wanted))
         self.here = shown[-1]
         self._led[name, before] = self.here if self.here != before else ""
         self._watch_rest()
+
+    def _hurries(self, state: str) -> bool:
+        """Return whether an operation came, maybe too late, in a state that changes by itself: now it is at once."""
+        tried = (self._tried[name, state] for name in self._map.operations)
+        return state in self._map.changes and any(0 < count < _TRIES for count in tried)
 
     def _watch_rest(self) -> None:
         """Record whether the device moves in a state of rest, after the time in which it may settle."""

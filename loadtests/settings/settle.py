@@ -167,7 +167,7 @@ def _token(path: str | None) -> str | None:
     try:
         token = read_secret(path)
     except (OSError, UnicodeDecodeError) as error:
-        raise SettingsError(f"token file {path!r}: {getattr(error, 'strerror', None) or error}") from None
+        raise SettingsError(str(error) if isinstance(error, OSError) else f"token file {path!r}: {error}") from None
     if not token or not token.isascii() or not token.isprintable() or " " in token:
         raise SettingsError(f"token file {path!r} is not a token: expected one line of printable ASCII without spaces")
     return token

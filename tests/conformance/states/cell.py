@@ -49,10 +49,11 @@ class Cell:
     Args:
         fault: its fault; empty: it is right.
         program_s: how long a program runs, s; None: until it is stopped.
+        over_s: after which part of that it has ended when a command comes, though the read before it came in time, s.
     """
 
-    def __init__(self, fault: str = "", program_s: float | None = None) -> None:
-        self.fault, self.program_s = fault, program_s
+    def __init__(self, fault: str = "", program_s: float | None = None, over_s: float = 60.0) -> None:
+        self.fault, self.program_s, self.over_s = fault, program_s, over_s
         self._state, self._since, self.sent = "ready", time.monotonic(), list[str]()
         ok = {"responses": {"204": {"description": "done"}, "409": REFUSED, "4XX": REFUSED}}
         body = {"type": "object", "required": ["percent"], "properties": {"percent": {"type": "integer"}}}
@@ -89,6 +90,8 @@ class Cell:
         return web.json_response({"state": state})
 
     async def _act(self, request: web.Request) -> web.Response:
+        if self.state == "running" and time.monotonic() - self._since > self.over_s:
+            self._to("ready")
         name, before = request.path[1:], self.state
         self.sent.append(name)
         if name == "speed" and not isinstance(json.loads(await request.read() or b"null"), dict):

@@ -170,9 +170,11 @@ def test_ready_is_not_said_while_it_moves(arm, more, blamed, tmp_path):
     assert all(" moved by " in one.observed and "/cell" in one.exchange.request.target for one in found)
 
 
-def test_a_program_that_ends_by_itself_is_no_fault(judged):
+@pytest.mark.parametrize(("program_s", "over_s"), [(0.4, 60.0), (0.6, 0.25)])
+def test_a_program_that_ends_by_itself_is_no_fault(program_s, over_s, judged):
+    """One ends between a read and the command after it, unless that comes soon."""
     more = 'running = { to = ["ready"], within_s = 2 }\n'
-    outcome = judged(Cell(program_s=0.4), more)
+    outcome = judged(Cell(program_s=program_s, over_s=over_s), more)
     assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
 
 

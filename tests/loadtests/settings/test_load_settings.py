@@ -40,7 +40,10 @@ def test_options_win_over_the_statement_and_defaults_fill_the_rest():
         (CliOptions.of(**REST, warmup_s=-1.0), "--warmup -1 is out of range"),
         (CliOptions.of(**REST, rate=501.0, allow_motion=True), "exceeds 500 requests/s (the default limit"),
         (CliOptions.of(**REST, duration_s=121.0, allow_motion=True), "exceeds 120 s (the default limit"),
-        (CliOptions.of(**REST, token_file="/nonexistent"), "token file '/nonexistent': No such file"),  # noqa: S106 - a path
+        (
+            CliOptions.of(**REST, token_file="/nonexistent"),  # noqa: S106 - a path
+            "file '/nonexistent' with a secret cannot be read: No such file",
+        ),
         (CliOptions.of(**REST, ca_file="/nonexistent"), "ca_file '/nonexistent'"),
         (CliOptions.of(**REST, interfaces=("soap",)), "--interface soap needs"),
     ],
